@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from palette4d.analysis.polytope import Section, SkewPolytope
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.media.clip_base import Clip, describe
 
 # Factor of L', against its value on the palette's own clip, above which a note reports a worse fit.
@@ -32,15 +32,15 @@ def read(document: Mapping[str, Any], clip: Clip) -> SkewPolytope:
     name, first, last = old["name"], old["frames"]["first"], old["frames"]["last"]
     if last - first != clip.frames[-1] - clip.frames[0]:
         raise Palette4dError(
-            f"like=…: the palette of {name} covers the frames {first}-{last}, and the clip has "
-            f"{describe(clip.frames)}; expected as many. Leave out like=…, and copy the grade to "
-            "the new palette"
+            f"{Arg('like')}: the palette of {name} covers the frames {first}-{last}, and the clip "
+            f"has {describe(clip.frames)}; expected as many. Leave out {Arg('like')}, and copy the "
+            "grade to the new palette"
         )
     if clip.encoding != old["encoding"] and "unknown" not in (clip.encoding, old["encoding"]):
         raise Palette4dError(
-            f"like=…: the palette of {name} is in {old['encoding']}, and this one would be in "
-            f"{clip.encoding}; expected the same: give the colour spaces of the earlier analysis, "
-            "or none if it had none"
+            f"{Arg('like')}: the palette of {name} is in {old['encoding']}, and this one would be "
+            f"in {clip.encoding}; expected the same: give the colour spaces of the earlier "
+            "analysis, or none if it had none"
         )
     return _polytope(document["polytope"]).later(clip.frames[0] - first)
 
@@ -84,5 +84,5 @@ def fit(document: Mapping[str, Any], loss: float) -> list[str]:
         return []
     return [
         f"the earlier palette fits this version worse (L_prime {loss:.3f}) than its own "
-        f"({own:.3f}); leave out like=… to find a new one"
+        f"({own:.3f}); leave out {Arg('like')} to find a new one"
     ]

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 
 METHODS = {
     "skew": "only handles that are worth their cost (default)",
@@ -197,9 +197,10 @@ def check_methods(method: str, given: dict[str, Any]) -> None:
         if option.field in given and method not in option.methods:
             if method == LIKE:
                 raise Palette4dError(
-                    f"{name} has no effect with like=…, which keeps the handles; leave one out"
+                    f"{name} has no effect with {Arg('like')}, which keeps the handles; leave one "
+                    "out"
                 )
             raise Palette4dError(
-                f'{name} has no effect with method="{method}"; expected '
+                f"{name} has no effect with {Arg('method', method)}; expected "
                 f"{' or '.join(option.methods)}"
             )

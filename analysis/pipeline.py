@@ -43,7 +43,7 @@ from palette4d.analysis.report import advice, quality
 from palette4d.analysis.report.quality import Report
 
 from palette4d import _core
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Message, Palette4dError
 from palette4d.common.text import counted
 from palette4d.grade import sidecar
 from palette4d.grade.handle_names import vertex_colours
@@ -165,7 +165,7 @@ def analyze(
     usable, missing = _usable(clip.frames, gathered.frames)
     if starts := cuts.find_cuts((frame.frame, frame.histogram) for frame in usable):
         if not allow_cuts:
-            raise Palette4dError(f"{clip.source}: {cuts.refusal(clip.frames, starts)}")
+            raise Palette4dError(f"{clip.source}: {cuts.refusal(clip.frames, starts).marked}")
         missing.append(cuts.note(starts))
     result = find_polytope(usable, options, tell, earlier)
     polytope = result.polytope
@@ -215,7 +215,7 @@ def analyze(
     return Analysis(
         result.polytope,
         result.stages,
-        tuple(notes),
+        tuple(map(Message, notes)),
         document=document,
         report=report,
         colours=colour_space.described(used),
@@ -271,7 +271,9 @@ def find_polytope(
     run = _Run(frames, options, progress)
     if options.method == LIKE:
         if earlier is None:
-            raise Palette4dError('method="like" needs the palette of an earlier version: like=…')
+            raise Palette4dError(
+                f"{Arg('method', 'like')} needs the palette of an earlier version: {Arg('like')}"
+            )
         polytope = _moved(run, earlier.later(-first))
     else:
         methods = {"skew": _skew, "paper": _paper, "static": _static, "rgbt": _rgbt}
@@ -475,7 +477,7 @@ def _glued(
     if partial := sum(not g.complete for g in glued):
         notes.append(
             f"at {partial} of {boundaries} the search for edges ended early; with a smaller "
-            "palette_size=… it sees every solution"
+            f"{Arg('palette_size')} it sees every solution"
         )
     return dense, tuple(notes)
 

@@ -40,7 +40,7 @@ from palette4d.lut_export.spaces import INPUT, space_of
 
 from palette4d import _core
 from palette4d.colour.difference import viewing_of
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.common.files import refuse_existing, replacing
 from palette4d.grade import sidecar as sidecars
 from palette4d.grade.document import Document
@@ -313,7 +313,8 @@ def check_settings(
         Shaper(kind, *settings.domain)
     if kind in ("linear", "log") and not format_.shaper:
         raise Palette4dError(
-            f'{format_.title} cannot hold a shaper; choose one of {with_shaper()}, or shaper="none"'
+            f"{format_.title} cannot hold a shaper; choose one of {with_shaper()}, or "
+            f"{Arg('shaper', 'none')}"
         )
 
 
@@ -358,4 +359,4 @@ def nearer(size: int | None) -> str:
     if size is None:
         return "a 3D LUT (.clf, .cube) is nearer"
     exact = "the node and `palette4d render` are exact"
-    return f"a larger size=… is nearer; {exact}" if size < lut3d.LARGEST else exact
+    return f"a larger {Arg('size')} is nearer; {exact}" if size < lut3d.LARGEST else exact

@@ -16,7 +16,7 @@ from palette4d.lut_export.bake_error import FLOOR
 from palette4d.lut_export.frame_edit import FrameEdit
 from palette4d.lut_export.writers import Description, one_line
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -127,7 +127,7 @@ def read(path: Path) -> Cdl:
         found: Any = ocio.CDLTransform.CreateFromFile(str(path), "")
     except ocio.Exception as error:
         raise Palette4dError(
-            f"{path}: no CDL can be read ({error}); export it again with force=True"
+            f"{path}: no CDL can be read ({error}); export it again with {Arg('force', True)}"
         ) from error
     return Cdl(
         _triple(found.getSlope()),

@@ -34,7 +34,7 @@ from palette4d.lut_export.spaces import PALETTE
 
 from palette4d import _core
 from palette4d.colour.ocio_config import BUILT_IN, failures
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.common.files import make_folder, refuse_existing, replace_by_link, replacing
 from palette4d.common.text import checked_name, counted, file_safe
 from palette4d.jobs.workers import Workers
@@ -158,7 +158,7 @@ def write_config(
         except failures() as error:
             raise Palette4dError(
                 f"{path}: OpenColorIO refuses the config: {error}; only the LUTs were written. "
-                f"Fix {base}, or choose another with base=…"
+                f"Fix {base}, or choose another with {Arg('base')}"
             ) from error
     return WrittenConfig(path, base, shots, views, notes)
 
@@ -184,12 +184,12 @@ def _shot_names(
         if same:
             raise Palette4dError(
                 f"two shots have the name {name!r}: {sidecars[same[0]]} and {sidecars[i]}; "
-                "expected one of its own for each look, give them with names=…"
+                f"expected one of its own for each look, give them with {Arg('names')}"
             )
         if name.lower() == ANY_SHOT:
             raise Palette4dError(
                 f"{sidecars[i]}: found the shot name {name!r}, the name of the look for all shots; "
-                "give another with names=…"
+                f"give another with {Arg('names')}"
             )
     return names
 
@@ -217,8 +217,8 @@ def _refuse_far(names: list[str], between: list[BetweenError | None]) -> None:
     if far:
         raise Palette4dError(
             f"the edit changes too much between the baked frames: found {'; '.join(far)}; "
-            f"expected at most {LARGEST_DELTA_E:g}. Choose more frames (a smaller every=…), or "
-            "write the config with anyway=True; nothing was written"
+            f"expected at most {LARGEST_DELTA_E:g}. Choose more frames (a smaller {Arg('every')}), "
+            f"or write the config with {Arg('anyway', True)}; nothing was written"
         )
 
 

@@ -16,7 +16,7 @@ from palette4d.colour.ocio_config import (
     near_spaces,
     space_of_encoding,
 )
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.common.files import make_folder, replacing, temporary_folder
 
 #: The folders beside the config: of the LUTs, and of what the base's archive holds.
@@ -28,7 +28,7 @@ ANY_SHOT = "palette4d"
 
 def load_base(base: str) -> tuple[Any, bool]:
     """Return an editable copy of the base config, and whether it is an archive."""
-    return load_config(base, "base=…"), base.lower().endswith(".ocioz")
+    return load_config(base, f"{Arg('base')}"), base.lower().endswith(".ocioz")
 
 
 def space_of_sidecar(config: Any, base: str, sidecar: _core.Sidecar, wanted: str | None) -> str:
@@ -40,12 +40,12 @@ def space_of_sidecar(config: Any, base: str, sidecar: _core.Sidecar, wanted: str
     import PyOpenColorIO as ocio
 
     if wanted is not None:
-        return str(colour_space(config, base, wanted, "process_space=").getName())
+        return str(colour_space(config, base, wanted, Arg("process_space", wanted)).getName())
     encoding = str(sidecar.clip["encoding"])
     if encoding.strip().lower() in ("", "unknown"):
         raise Palette4dError(
             f"the sidecar of {sidecar.clip['name']!r} does not say in which encoding its colours "
-            "are; name a colour space of the config with process_space=…"
+            f"are; name a colour space of the config with {Arg('process_space')}"
         )
     if (named := space_of_encoding(config, encoding)) is not None:
         return str(named.getName())
@@ -60,8 +60,8 @@ def space_of_sidecar(config: Any, base: str, sidecar: _core.Sidecar, wanted: str
             if missing:
                 lacking = f"; it lacks the role {missing[0]}, which could identify one"
     raise Palette4dError(
-        f"{base}: found no colour space for {encoding!r}{lacking}; name one with process_space=…, "
-        f"such as {near_spaces(config, encoding)}"
+        f"{base}: found no colour space for {encoding!r}{lacking}; name one with "
+        f"{Arg('process_space')}, such as {near_spaces(config, encoding)}"
     )
 
 
@@ -73,11 +73,11 @@ def refuse_looks(config: Any, base: str, names: list[str]) -> None:
             other = (
                 "give all shots in one command"
                 if name == ANY_SHOT
-                else "choose others with names=…"
+                else f"choose others with {Arg('names')}"
             )
             raise Palette4dError(
                 f"{base}: it has a look {name!r} already, expected none; {other}, or replace it "
-                "with force=True"
+                f"with {Arg('force', True)}"
             )
 
 

@@ -16,7 +16,7 @@ from palette4d.lut_export.frame_edit import check_frame, frame_text
 
 from palette4d import _core
 from palette4d.common.arguments import parse_frames
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.common.files import refuse_existing, replacing
 from palette4d.common.text import printable
 from palette4d.grade import sidecar as sidecars
@@ -143,8 +143,8 @@ def export_dctl(
     if size > MOST_BYTES:
         raise Palette4dError(
             f"{output}: found {size / 1024:.0f} KB of palette colours and edits, and a DCTL has "
-            f"room for {MOST_BYTES // 1024} KB: export a range of the clip (frames=…), or parts of "
-            "it to a file each"
+            f"room for {MOST_BYTES // 1024} KB: export a range of the clip ({Arg('frames')}), or "
+            "parts of it to a file each"
         )
     text = _TEXT.format(
         name=" ".join(printable(str(sidecar.clip["name"])).split()),

@@ -29,7 +29,7 @@ from palette4d.lut_export.writers import Description
 from palette4d import _core
 from palette4d.colour.conversion_steps import Step
 from palette4d.colour.difference import Viewing
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 
 F32 = NDArray[np.float32]
 #: Samples a side of a LUT whose size is not given: of handles alone, and with picks. It grows up to
@@ -160,7 +160,7 @@ def _too_far(job: Job, size: int, grid: Measure, clip: Measure | None) -> str:
     if clip is not None and clip.outside_domain > 0:
         return text + (
             f"{clip.outside_domain:.3%} of the colours are clamped: choose a format with a shaper "
-            f"({with_shaper()}) or a wider domain=…"
+            f"({with_shaper()}) or a wider {Arg('domain')}"
         )
     return text + "Allow a larger error, or use the node or `palette4d render`, which are exact"
 

@@ -35,7 +35,7 @@ from palette4d.lut_export.series_index import (
 from palette4d import _core
 from palette4d.colour.ocio_config import from_anywhere
 from palette4d.common.arguments import frames_between
-from palette4d.common.errors import Palette4dError, WriteError
+from palette4d.common.errors import Arg, Palette4dError, WriteError
 from palette4d.common.files import make_folder, replacing, temporary_folder
 from palette4d.common.text import checked_name, file_safe
 from palette4d.jobs.workers import Failed, Workers
@@ -139,7 +139,7 @@ def stops(sidecar: _core.Sidecar) -> tuple[int, ...]:
     if not times:
         raise Palette4dError(
             "nothing is edited in this sidecar, so that there are no stops; edit it, or choose "
-            "every=… or frames=…"
+            f"{Arg('every')} or {Arg('frames')}"
         )
     low, high = _limits(sidecar)
     return tuple(sorted({min(max(math.floor(t + 0.5), low), high) for t in times}))

@@ -10,7 +10,7 @@ from palette4d.lut_export.bake import BakeResult
 from palette4d.lut_export.measured_write import BakeSettings
 
 from palette4d import _core
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.common.files import replacing
 from palette4d.common.json_files import UnusableFile, read_json
 from palette4d.common.text import counted
@@ -100,7 +100,7 @@ def read_index(path: Path, header: dict[str, Any], force: bool) -> dict[int, Ent
             return {}
         raise Palette4dError(
             f"{path}: found no index of a series that can be read, expected the one that an "
-            "earlier export wrote; replace it with force=True, or choose another folder"
+            f"earlier export wrote; replace it with {Arg('force', True)}, or choose another folder"
         ) from error
     changed = [word for key, word in _CHANGED.items() if known[key] != header[key]]
     if sha256 != header["sidecar"]["sha256"]:
@@ -110,7 +110,8 @@ def read_index(path: Path, header: dict[str, Any], force: bool) -> dict[int, Ent
     if not force:
         raise Palette4dError(
             f"{path}: it lists a series of {counted(len(entries), 'file')} that was made with "
-            f"{' and '.join(changed)}; replace it with force=True, or choose another folder"
+            f"{' and '.join(changed)}; replace it with {Arg('force', True)}, or choose another "
+            "folder"
         )
     return {}
 

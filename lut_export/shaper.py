@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 
 F64 = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ class Shaper:
         if self.kind == "none" and (self.low, self.high) != (0.0, 1.0):
             raise Palette4dError(
                 f"found the domain {self.low:g} to {self.high:g} without a shaper, which covers 0 "
-                'to 1; choose shaper="log" or "linear", or leave out domain=…'
+                f'to 1; choose {Arg("shaper", "log")} or "linear", or leave out {Arg("domain")}'
             )
 
     def forward(self, x: ArrayLike) -> F64:

@@ -21,7 +21,7 @@ from palette4d.colour.ocio_config import (
     load_config,
     space_of_encoding,
 )
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 
 F32 = NDArray[np.float32]
 
@@ -80,16 +80,16 @@ def space_of(
         steps = json.loads(data)["clip"]["conversion"]["steps"]
         return BakeSpace(own.input_space, tuple(steps), clip, clip)
     if config_name is None and own is not None:
-        config, config_name = load_config(own.config, "ocio_config=…"), own.config
+        config, config_name = load_config(own.config, f"{Arg('ocio_config')}"), own.config
     else:
         config, config_name = chosen_config(config_name)
-    name = str(colour_space(config, config_name, wanted, "space=").getName())
+    name = str(colour_space(config, config_name, wanted, Arg("space", wanted)).getName())
     palette = space_of_encoding(config, encoding)
     if palette is None:
         raise Palette4dError(
             f"the sidecar's palette is in {encoding!r}, which {config_name} does not know, so that "
-            "it cannot be converted; analyse with input_space=…, or name the config that knows it "
-            "with ocio_config=…"
+            f"it cannot be converted; analyse with {Arg('input_space')}, or name the config that "
+            f"knows it with {Arg('ocio_config')}"
         )
     made = conversion(config, name, str(palette.getName()))
     if not made.steps:

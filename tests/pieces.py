@@ -21,6 +21,16 @@ def piece(value: int, threads: int) -> tuple[int, int]:
     return value * value, threads
 
 
+def once(marker: str, threads: int) -> str:
+    """End the process, but only the first time."""
+    try:
+        Path(marker).touch(exist_ok=False)
+    except FileExistsError:
+        return "done"
+    os.kill(os.getpid(), signal.SIGKILL)
+    raise AssertionError
+
+
 def noted(folder: str, threads: int) -> None:
     """Leave a file with this process's number in a folder, and take a while."""
     Path(folder, f"{os.getpid()}.pid").touch()

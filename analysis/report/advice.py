@@ -14,6 +14,7 @@ from palette4d.analysis.losses import LOST_SHARE
 from palette4d.analysis.options import LIKE, OPTIONS, AnalysisOptions
 from palette4d.analysis.report.quality import Report
 
+from palette4d.common.message import Arg, Message
 from palette4d.common.text import counted
 
 # Thresholds of L for a badly fitting frame: a multiple of the median frame's L, and an L.
@@ -30,9 +31,9 @@ AT_ONCE = {"gamma": 0.0003, "handle_cost": 0.001, "blocks": 9}
 BRIGHT = 2.0
 
 #: The remedies for the palettes of other methods, and for those of earlier versions.
-DEFAULT = 'take the default method="skew"'
-ANEW = "leave out like=…, so that a palette is found anew"
-PARTS = "analyse parts of the clip by themselves with frames=…"
+DEFAULT = f"take the default {Arg('method', 'skew')}"
+ANEW = f"leave out {Arg('like')}, so that a palette is found anew"
+PARTS = f"analyse parts of the clip by themselves with {Arg('frames')}"
 
 
 def warnings(
@@ -41,7 +42,7 @@ def warnings(
     farthest: Mapping[str, float],
     *,
     brightest: float,
-) -> tuple[str, ...]:
+) -> tuple[Message, ...]:
     """Return the warnings about a palette.
 
     Parameters
@@ -53,11 +54,12 @@ def warnings(
         where distances mean little: that is then the only warning.
     """
     if brightest > BRIGHT:
-        return (
+        text = (
             f"the clip has code values up to {brightest:.3g}: if it is scene-linear, these figures "
-            "mean little; give its colour space with input_space=… (such as ACEScg), and leave out "
-            "palette_space=…: the palette is then found in a log encoding",
+            f"mean little; give its colour space with {Arg('input_space')} (such as ACEScg), and "
+            f"leave out {Arg('palette_space')}: the palette is then found in a log encoding"
         )
+        return (Message(text),)
     texts = (
         _fit(report, options),
         _lost(report, options, farthest),
@@ -65,7 +67,7 @@ def warnings(
         _concave(report),
         _unused(report, options),
     )
-    return tuple(text for text in texts if text)
+    return tuple(Message(text) for text in texts if text)
 
 
 def _another(options: AnalysisOptions) -> str:
@@ -89,10 +91,10 @@ def _fit(x: Report, options: AnalysisOptions) -> str:
     if options.method != "skew":
         ways = _another(options)
     elif options.vertices:
-        ways = f"raise vertices=…, or {PARTS}"
+        ways = f"raise {Arg('vertices')}, or {PARTS}"
     elif bad:
         given = all(getattr(options, name) == value for name, value in AT_ONCE.items())
-        settings = " ".join(f"{name}={value}" for name, value in AT_ONCE.items())
+        settings = " ".join(f"{Arg(*setting)}" for setting in AT_ONCE.items())
         ways = PARTS if given else f"{PARTS}, or, for a flash, try {settings}"
     else:
         ways = f"lower the setting handle_cost or raise blocks, or {PARTS}"
@@ -118,10 +120,11 @@ def _lost(x: Report, options: AnalysisOptions, farthest: Mapping[str, float]) ->
     if options.method == "skew":
         reach = options.reach / 2 or OPTIONS["reach"].default
         ways = (
-            f"try lambda_={10 * options.lambda_:g} or reach={reach:.2g}, so that rare "
-            f"colours count more, or a lower k=… if they have fewer than {options.k:g} pixels"
+            f"try {Arg('lambda_', 10 * options.lambda_)} or {Arg('reach', reach)}, so that rare "
+            f"colours count more, or a lower {Arg('k')} if they have fewer than {options.k:g} "
+            "pixels"
         )
-    static = ', or method="static"' if "one static palette leaves" in nearer else ""
+    static = f", or {Arg('method', 'static')}" if "one static palette leaves" in nearer else ""
     return (
         f"in frame {frame.frame} colours of {frame.lost:.2%} of the picture lie up to "
         f"{frame.farthest:.2f} outside the palette, where {where}: if they are highlights rather "
@@ -137,7 +140,7 @@ def _lookalikes(x: Report, options: AnalysisOptions) -> str:
     if options.method == "skew":
         ways = (
             "lower the setting palette_size, or raise separation or merge_distance; or, if little "
-            'moves, take method="static"'
+            f"moves, take {Arg('method', 'static')}"
         )
     return (
         f"near frame {frame} the handles {first} and {second} are hard to tell apart "
@@ -150,7 +153,7 @@ def _concave(x: Report) -> str:
         return ""
     return (
         f"at frame {x.concavity[1]} the palette is not convex (it lacks {x.concavity[0]:.0%} of "
-        "its convex hull), and recoloured gradients may step there: raise convexity=…"
+        f"its convex hull), and recoloured gradients may step there: raise {Arg('convexity')}"
     )
 
 
@@ -160,5 +163,5 @@ def _unused(x: Report, options: AnalysisOptions) -> str:
         return ""
     ways = _another(options)
     if options.method == "skew":
-        ways = "raise handle_cost=…, or ask for fewer vertices=…"
+        ways = f"raise {Arg('handle_cost')}, or ask for fewer {Arg('vertices')}"
     return f"the handle {handle} weighs less than {UNUSED:.1%} in every frame: {ways}"

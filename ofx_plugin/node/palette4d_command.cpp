@@ -145,16 +145,31 @@ Json last_event(const fs::path& file) {
     }
 }
 
-std::string text_of(const Json& event, const char* name) {
-    const Json part = event.is_object() ? event.value(name, Json()) : Json();
-    std::string text = part.is_string() ? part.get<std::string>() : "";
+std::string string_of(const Json& object, const char* name) {
+    const Json value = object.is_object() ? object.value(name, Json()) : Json();
+    return value.is_string() ? value.get<std::string>() : "";
+}
+
+/// The text of an error event, which names fields of Studio's dialog; "" for other events.
+std::string error_of(const Json& event) {
+    std::string text;
+    bool fields = false;
+    for (const Json& part : event.is_object() ? event.value("error", Json()) : Json()) {
+        const std::string field = string_of(part, "field");
+        fields = fields || !field.empty();
+        text += part.is_string() ? part.get<std::string>()
+                : !field.empty() ? field
+                                 : string_of(part, "option");
+    }
     std::replace(text.begin(), text.end(), '\n', ' ');
-    return text;
+    if (!fields) return text;
+    if (text.back() == '.') text.pop_back();
+    return text + ". Push Open in Studio for these, and choose File > Analyse\xe2\x80\xa6";
 }
 
 /// How far an analysis is; "" where it has not said.
 std::string progress(const Json& event) {
-    const std::string stage = text_of(event, "stage");
+    const std::string stage = string_of(event, "stage");
     if (stage.empty()) return "";
     const Json done = event.value("done", Json()), total = event.value("total", Json());
     return ": " + stage + (total.is_number() ? ": " + done.dump() + " of " + total.dump() : "");
@@ -173,13 +188,8 @@ std::string reason(const std::string& line) {
 bool keep(Analysis& one) {
     if (!one.child || one.child->running()) return true;
     const Json event = last_event(one.folder / "progress");
-    std::string said = text_of(event, "error");
-    if (said.empty()) {
-        said = reason(one.child->last_words());
-    } else if (event.value("fields", Json()) == true) {
-        if (said.back() == '.') said.pop_back();
-        said += ". Push Open in Studio for these, and choose File > Analyse\xe2\x80\xa6";
-    }
+    std::string said = error_of(event);
+    if (said.empty()) said = reason(one.child->last_words());
     one.child.reset();
     std::error_code error;
     fs::remove_all(one.folder, error);

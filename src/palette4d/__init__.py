@@ -15,7 +15,7 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from palette4d.common.errors import Palette4dError, SidecarError, UnfinishedError
+from palette4d.common.errors import Arg, Palette4dError, SidecarError, UnfinishedError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -164,7 +164,8 @@ def analyze(
 
     if like is not None and method != "skew":
         raise Palette4dError(
-            f'like=… moves a palette, and method="{method}" finds one: give one of them'
+            f"{Arg('like')} moves a palette, and {Arg('method', method)} finds one: give one of "
+            "them"
         )
     options = AnalysisOptions.of(method if like is None else LIKE, settings)
     earlier = load(like) if isinstance(like, str | os.PathLike) else like

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections.abc import Callable
 from fractions import Fraction
@@ -16,6 +15,7 @@ from clip_files import grey_levels, write_image, write_movie
 
 from palette4d import _core
 from palette4d.cli import render
+from palette4d.common.arguments import Parser
 from palette4d.common.errors import Palette4dError, WriteError
 from palette4d.grade import rendering
 from palette4d.grade.document import Document
@@ -29,7 +29,7 @@ PICKS = GOLDEN / "v2_picks.p4d.json"
 
 def run(*words: object) -> int:
     """Run the verb alone, without the other verbs' modules."""
-    parser = argparse.ArgumentParser()
+    parser = Parser()
     render.add_parser(parser.add_subparsers())
     args = parser.parse_args(["render", *map(str, words)])
     return args.run(args)

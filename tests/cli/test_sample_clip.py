@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from palette4d.cli import sample_clip
+from palette4d.common.arguments import Parser
 from palette4d.common.errors import Palette4dError
 from palette4d.demo.scene import Scene, fractal_noise, value_noise
 from palette4d.media.clip import open_clip
@@ -16,7 +16,7 @@ from palette4d.media.clip import open_clip
 
 def run(*words: object) -> int:
     """Run the verb alone, without the other verbs' modules."""
-    parser = argparse.ArgumentParser()
+    parser = Parser()
     sample_clip.add_parser(parser.add_subparsers())
     args = parser.parse_args(["sample-clip", *map(str, words)])
     return args.run(args)

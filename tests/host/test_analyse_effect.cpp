@@ -97,7 +97,7 @@ TEST(studio_opens_the_sidecar_or_the_frames) {
     };
     CHECK(open().find("shot.p4d.json is not there yet; push Analyse first") != std::string::npos);
     CHECK(!effect.started());
-    write("go", R"({"error": "it has cuts"})"
+    write("go", R"({"error": ["it has cuts"]})"
                 "\n");
     effect.push();
     CHECK(soon([&] { return effect.status().find("failed: it has cuts") != std::string::npos; }));

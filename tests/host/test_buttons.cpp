@@ -333,7 +333,7 @@ TEST(an_analysis_that_fails_says_why) {
     const std::string kept = sidecar("mine.p4d.json");
     window.node->set("clipFile", (folder() / "shot.mov").u8string());
     window.node->set("sidecar", kept);
-    write("go", R"({"error": "it has edits; keep them with\n'Edits'", "fields": true})"
+    write("go", R"({"error": ["it has edits; keep them with\n", {"field": "'Edits'"}]})"
                 "\n");
     window.push("analyse");
     CHECK(soon(

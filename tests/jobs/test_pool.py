@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from farm_processes import running, wait_for
-from pieces import piece
+from pieces import once, piece
 
 from palette4d.jobs import pool
 from palette4d.jobs.pool import Failed
@@ -45,6 +45,13 @@ def test_a_process_that_is_ended_fails_only_its_piece() -> None:
     failed = {key for key, outcome in found.items() if isinstance(outcome, Failed)}
     assert failed == {1, 3}
     assert all("ended from outside" in str(found[key]) for key in failed)
+
+
+def test_a_process_that_is_ended_once_is_tried_again(tmp_path: Path) -> None:
+    found: dict[int, object] = {}
+    tasks = {number: str(tmp_path / str(number)) for number in range(3)}
+    pool.run(once, tasks, found.__setitem__, 2)
+    assert found == dict.fromkeys(tasks, "done")
 
 
 def test_processes_that_end_while_others_start() -> None:

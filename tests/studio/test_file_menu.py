@@ -54,7 +54,7 @@ def test_a_palette_of_one_colour_and_a_clip_of_another_size(
     assert main(["analyze", str(clip), "-o", str(out), "--quiet"]) == 0
     window.open_path(str(out))
     settle(window)
-    window.commands.outside()
+    window.commands.calls["outside"]()
     settle(window)
     window.session.find_clip(str(other))
     settle(window)

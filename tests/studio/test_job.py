@@ -51,7 +51,7 @@ def test_an_error_names_the_fields_of_the_dialog(tmp_path: Path, analysed: Path)
     )
     assert job.wait(60) == 1
     assert job.messages.startswith("error: ")
-    assert f"'{texts.SKIP_BAD}'" in job.messages
+    assert f"'{texts.FIELDS['skip_bad_frames']}'" in job.messages
     assert "--" not in job.messages
 
 

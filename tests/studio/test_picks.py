@@ -362,7 +362,7 @@ def test_keys_set_the_range_at_the_playhead(qtbot: Any, opened: Window) -> None:
     pick(qtbot, opened, 40, 30)
     session = opened.session
     session.select()
-    opened.commands.act_until()
+    opened.commands.calls["act_until"]()
     assert session.status.level == "warning"
     session.select("p1")
     for key, frame, wanted in (

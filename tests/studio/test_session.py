@@ -7,13 +7,22 @@ import os
 import shutil
 from collections.abc import Generator
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from clip_files import grey_levels
 
 import palette4d
 from palette4d.cli.main import main
-from palette4d.studio.session import TRY_AGAIN, Session, recovered, recovery_files
+from palette4d.studio.session import (
+    SAVE_AFTER,
+    SAVE_AT_MOST,
+    TRY_AGAIN,
+    Session,
+    recovered,
+    recovery_files,
+)
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
 LATER = 1e9
@@ -81,6 +90,21 @@ def test_a_drag_writes_only_what_is_dropped(session: Session, sidecar: Path) -> 
     assert palette4d.load(sidecar).colour(id_) == palette4d.load(
         GOLDEN / "v1_tetrahedron.p4d.json"
     ).colour(id_)
+
+
+def test_edits_without_a_pause_are_saved_all_the_same(
+    session: Session, sidecar: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    id_, clock, written = vertex(sidecar), 0.0, []
+    monkeypatch.setattr("palette4d.studio.session.time", SimpleNamespace(monotonic=lambda: clock))
+    for _ in range(40):
+        clock += SAVE_AFTER / 4
+        before = sidecar.read_bytes()
+        session.edit(lambda document, x=clock: document.set(id_, rgb=(x / 10, 0.0, 0.0)))
+        session.tick()
+        written += [clock] if sidecar.read_bytes() != before else []
+    assert len(written) >= 2
+    assert max(np.diff([0.0, *written, clock])) <= SAVE_AT_MOST + SAVE_AFTER
 
 
 def test_a_cancelled_drag_leaves_nothing(session: Session, sidecar: Path) -> None:

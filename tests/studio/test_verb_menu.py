@@ -60,3 +60,24 @@ def test_escape_stops_what_runs_and_the_dialog_says_so(
     assert dialog.isVisible()
     dialog.reject()
     assert not dialog.isVisible()
+
+
+def test_a_failed_analysis_offers_the_fields_that_help(opened: Window, qtbot: Any) -> None:
+    dialog = opened.verbs.analyze_again()
+    edits = dialog.inputs[-2]
+    assert isinstance(edits, QComboBox)
+    kept = opened.session.document
+    assert kept is not None
+    kept.shift(kept.fields()["polytope"]["vertices"][0]["id"], by=(0.1, 0.0, 0.0))
+    opened.session.save()
+    edits.setCurrentIndex(0)  # refuse
+    dialog.start()
+    qtbot.waitUntil(lambda: dialog.stage.text() == texts.FAILED, timeout=30_000)
+    assert f"'{texts.EDITS}: {texts.EDITS_NAMES[1]}'" in dialog.log.toPlainText()
+    dialog.offers[0].click()
+    assert dialog.words()[-1] == "--keep-edits"
+    assert edits.hasFocus()
+    dialog.start()
+    assert not dialog.offers
+    qtbot.waitUntil(lambda: dialog.stage.text() != texts.RUNNING, timeout=60_000)
+    dialog.reject()

@@ -163,6 +163,14 @@ def test_a_sidecar_that_cannot_be_written_is_kept_elsewhere(
     assert opened.session.save()
     assert palette4d.load(sidecar).colour(id_) == (1.0, 0.0, 0.0)
     assert not next(recovery_files(sidecar)).exists()
+    # Saved elsewhere, nothing is lost, and the window closes.
+    monkeypatch.setattr(sidecars, "write", full)
+    opened.session.edit(lambda document: document.set(id_, rgb=(0.0, 1.0, 0.0)))
+    there = str(tmp_path / "there.p4d.json")
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (there, ""))
+    opened.close()
+    assert not opened.isVisible()
+    assert palette4d.load(there).colour(id_) == (0.0, 1.0, 0.0)
 
 
 @pytest.mark.slow
@@ -187,7 +195,7 @@ def test_fifty_thousand_frames(
     settle(window)
     id_ = busiest(window)
     for _ in range(30):
-        window.timeline.zoom_in()
+        window.timeline.zoom(2)
     window.session.edit(lambda document: document.set(id_, rgb=(0.9, 0.3, 0.1)))
     settle(window)
     start, end = window.timeline.places.span

@@ -13,9 +13,9 @@ from typing import Any
 from palette4d import analyze, load
 from palette4d.analysis.options import LIKE, METHODS, OPTIONS, check_methods, parse_setting
 from palette4d.cli import analysis_report, analyze_shots
-from palette4d.cli.messages import as_options, tell
 from palette4d.cli.progress import progress_bar
 from palette4d.cli.reading import add_reading, clip_name
+from palette4d.cli.terminal import option_of, tell
 from palette4d.common.arguments import checked, frame_range, whole
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
@@ -189,7 +189,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     hidden = {action: action.help for action in parser._actions if action.dest not in FRONT}
     for action in hidden:
         action.help = argparse.SUPPRESS
-    parser.set_defaults(run=run, usage_error=parser.error, hidden_help=hidden)
+    parser.set_defaults(run=run, hidden_help=hidden)
 
 
 def _rate(text: str) -> Fraction:
@@ -223,7 +223,7 @@ def run(args: argparse.Namespace) -> int:
         bars.close()
     document.save(args.output, on_edits=on_edits)
     for note in document.notes:
-        tell("note", note)
+        tell(args, "note", note)
     if args.json:
         seconds = {"seconds": bars.seconds, "cpu_seconds": round(time.process_time(), 3)}
         print(json.dumps({"sidecar": str(args.output)} | document.report | seconds, indent=2))
@@ -245,11 +245,11 @@ def _settings(args: argparse.Namespace) -> dict[str, Any]:
     if args.vertices is not None:
         given["vertices"] = args.vertices
     if args.like is not None and args.method != "skew":
-        args.usage_error("--like moves a palette, and --method finds one: give one of them")
+        args.parser.error("--like moves a palette, and --method finds one: give one of them")
     try:
         check_methods(args.method if args.like is None else LIKE, given)
     except Palette4dError as error:
-        args.usage_error(as_options(str(error)))
+        args.parser.error(error.message.said(lambda arg: option_of(arg, args.parser)))
     spaces = ("input_space", "palette_space", "ocio_config")
     names = ("rate", "skip_bad_frames", "allow_cuts", "method", "on_edits", *spaces)
     return {name: vars(args)[name] for name in names} | given

@@ -6,11 +6,11 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from palette4d.cli.messages import tell
 from palette4d.cli.progress import frames_bar
+from palette4d.cli.terminal import tell
 from palette4d.cli.worker_options import add_worker_options
 from palette4d.common.arguments import whole
-from palette4d.common.errors import UnfinishedError
+from palette4d.common.errors import Message, UnfinishedError
 from palette4d.common.text import counted
 from palette4d.shows.timeline_files import is_timeline
 
@@ -86,20 +86,20 @@ def is_show(args: argparse.Namespace) -> bool:
         _refuse(args, for_shows, "needs an edit (.otio, .edl) as CLIP, or --detect-shots")
         return False
     if edit and args.detect_shots:
-        args.usage_error("--detect-shots splits a movie; an edit already has its shots")
+        args.parser.error("--detect-shots splits a movie; an edit already has its shots")
     if args.like is not None:
-        args.usage_error("--like is for one clip; each shot's palette is found anew")
+        args.parser.error("--like is for one clip; each shot's palette is found anew")
     if edit and args.frames is not None:
-        args.usage_error("--frames is for one clip; an edit defines the frames of each clip")
+        args.parser.error("--frames is for one clip; an edit defines the frames of each clip")
     if args.output.name.endswith(".json"):
-        args.usage_error(f"-o {args.output}: expected a folder, for a sidecar a shot")
+        args.parser.error(f"-o {args.output}: expected a folder, for a sidecar a shot")
     return True
 
 
 def _refuse(args: argparse.Namespace, given: dict[str, bool], needs: str) -> None:
     for option, there in given.items():
         if there:
-            args.usage_error(f"{option} {needs}")
+            args.parser.error(f"{option} {needs}")
 
 
 def run(args: argparse.Namespace, settings: dict[str, Any]) -> int:
@@ -126,7 +126,7 @@ def run(args: argparse.Namespace, settings: dict[str, Any]) -> int:
             done, failed = error.done, error
     for name, notes in done.notes.items():
         for note in notes:
-            tell("note", f"{name}: {note}" if name else note)
+            tell(args, "note", f"{name}: {Message(note).marked}" if name else note)
     if args.json:
         print(done.path.read_text(encoding="utf-8"), end="")
     elif not args.quiet:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from palette4d.cli.lut_options import add_lut_options, lut_settings, wide_help
-from palette4d.cli.messages import tell
+from palette4d.cli.terminal import tell
 from palette4d.common.arguments import number
 from palette4d.common.errors import WriteError
 
@@ -61,7 +61,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     add("--force", action="store_true", help="replace an existing file")
     add("--json", action="store_true", help="print the result as JSON")
-    parser.set_defaults(run=run, usage_error=parser.error)
+    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
         source = Document.load(source, version=args.version)
     piped = args.output == "-"
     if piped and args.format is None:
-        args.usage_error("-o - has no extension; expected --format FORMAT with it")
+        args.parser.error("-o - has no extension; expected --format FORMAT with it")
     format_ = format_named(args.format) if piped else format_of(Path(args.output), args.format)
     settings = {**lut_settings(args), "format": format_.name, "clip": args.clip}
     if piped:
@@ -93,12 +93,13 @@ def run(args: argparse.Namespace) -> int:
         print("\n".join(report(result)), file=out)
     if result.clip is None:
         tell(
+            args,
             "note",
             "the clip's frame could not be read; the error is measured on the dense grid only "
             "(name the clip with --clip)",
         )
     for line in warnings(result, format_):
-        tell("warning", line)
+        tell(args, "warning", line)
     return 0
 
 

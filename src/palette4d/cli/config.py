@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from palette4d.cli.export import add_frame_choice, add_run_options, export_settings
 from palette4d.cli.lut_options import add_lut_options, wide_help
-from palette4d.cli.messages import tell
 from palette4d.cli.progress import frames_bar
+from palette4d.cli.terminal import tell
 
 if TYPE_CHECKING:
     from palette4d.lut_export.config import WrittenConfig
@@ -54,7 +54,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_lut_options(parser, "clf", space=False)
     add_run_options(parser)
     add("--json", action="store_true", help="print what was written as JSON")
-    parser.set_defaults(run=run, usage_error=parser.error)
+    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
     elif not args.quiet:
         print("\n".join(report(done)))
     for note in done.notes:
-        tell("note", note)
+        tell(args, "note", note)
     return 0
 
 

@@ -180,13 +180,13 @@ def _add_track(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
 def _add_float(parser: argparse._ActionsContainer) -> None:
     parser.add_argument(
         "--float",
+        dest="any_value",
         action="store_true",
         help="take colours such as 255 128 0 as they are, not as integers of 8 bits",
     )
 
 
 def _add_change(parser: argparse.ArgumentParser) -> None:
-    parser.set_defaults(usage_error=parser.error)
     change = parser.add_argument_group("CHANGE: a colour, or offsets, or hue, chroma and lightness")
     change.add_argument(
         "--rgb",
@@ -298,7 +298,7 @@ def run_set(args: argparse.Namespace) -> int:
     document = load(args.sidecar)
     before = _without_picks(document)
     found = document.set_near(
-        args.near, frame=args.frame, anyway=args.anyway, any_value=args.float, **_how(args)
+        args.near, frame=args.frame, anyway=args.anyway, any_value=args.any_value, **_how(args)
     )
     document.save()
     print(
@@ -318,7 +318,9 @@ def run_adjust(args: argparse.Namespace) -> int:
     """Change a handle, a track or the palette."""
     document = load(args.sidecar)
     before = _without_picks(document)
-    document.adjust(args.id, track=args.track, frame=args.frame, any_value=args.float, **_how(args))
+    document.adjust(
+        args.id, track=args.track, frame=args.frame, any_value=args.any_value, **_how(args)
+    )
     document.save()
     _report(document, before)
     return 0
@@ -327,7 +329,7 @@ def run_adjust(args: argparse.Namespace) -> int:
 def _how(args: argparse.Namespace) -> How:
     kinds = (args.rgb, args.by, (args.hue, args.chroma, args.lightness))
     if [kind in (None, (0, 1, 1)) for kind in kinds].count(False) != 1:
-        args.usage_error("expected either --rgb, or --by, or some of --hue, --chroma, --lightness")
+        args.parser.error("expected either --rgb, or --by, or some of --hue, --chroma, --lightness")
     return {
         "rgb": args.rgb,
         "by": args.by,
@@ -399,7 +401,7 @@ def run_move(args: argparse.Namespace) -> int:
         document.move(args.id, frame=args.frame)
     if args.by is not None:
         before = document.colour(args.id)
-        document.shift(args.id, by=args.by, any_value=args.float)
+        document.shift(args.id, by=args.by, any_value=args.any_value)
         after = document.colour(args.id)
         lines.append(f"{document.named(args.id)}: {shown(before)} -> {shown(after)}")
     document.save()

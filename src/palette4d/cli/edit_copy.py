@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from palette4d import load
-from palette4d.cli.messages import tell
+from palette4d.cli.terminal import tell
 from palette4d.common.arguments import number
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
@@ -97,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
             print(_copied(shot, args))
         except Palette4dError as error:
             failed += 1
-            tell("error", str(error))
+            tell(args, "error", error.message)
     print(f"copied the grade to {counted(len(shots) - failed, 'shot')} of {len(shots)}")
     return 1 if failed else 0
 

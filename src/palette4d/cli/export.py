@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palette4d.cli.lut_options import add_lut_options, lut_settings, wide_help
-from palette4d.cli.messages import tell
 from palette4d.cli.progress import frames_bar
+from palette4d.cli.terminal import tell
 from palette4d.cli.worker_options import add_worker_options
 from palette4d.common.arguments import frame_range, whole
 from palette4d.common.errors import UnfinishedError
@@ -66,7 +66,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     edl = "write the EDL of a show with these CDLs as comments"
     add("--edl", metavar="OUT.edl", type=Path, help=edl)
     add("--json", action="store_true", help="print the index")
-    parser.set_defaults(run=run, usage_error=parser.error)
+    parser.set_defaults(run=run)
 
 
 def add_frame_choice(parser: argparse.ArgumentParser, *, required: bool) -> None:
@@ -96,9 +96,9 @@ def run(args: argparse.Namespace) -> int:
     if args.dctl is not None:
         return _dctl(args)
     if args.output is None:
-        args.usage_error("the following arguments are required: -o/--output")
+        args.parser.error("the following arguments are required: -o/--output")
     if args.every is None and not args.stops and args.frames is None:
-        args.usage_error("one of the arguments --every --stops --frames is required")
+        args.parser.error("one of the arguments --every --stops --frames is required")
     from palette4d.shows.exports import export
 
     failed: UnfinishedError | None = None
@@ -119,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
         except UnfinishedError as error:
             done, failed = error.done, error
     for note in done.notes:
-        tell("note", note)
+        tell(args, "note", note)
     if args.json:
         print(json.dumps(_index(done, args.sidecar), indent=2))
     elif not args.quiet:
@@ -130,7 +130,7 @@ def run(args: argparse.Namespace) -> int:
                 print(f"{written}: a CDL for each of {counted(len(done.series), 'shot')}")
         for one in done.series:
             print("\n".join(report(one)))
-    warn(done.series)
+    warn(args, done.series)
     if failed:
         raise failed
     return 0
@@ -144,7 +144,7 @@ def _dctl(args: argparse.Namespace) -> int:
 
     others = ("output", "every", "otio", "name", "clip", "size")
     if args.stops or any(getattr(args, name) is not None for name in others):
-        args.usage_error("--dctl: only with --frames, --force, --json and --quiet")
+        args.parser.error("--dctl: only with --frames, --force, --json and --quiet")
     done = export_dctl(args.sidecar, args.dctl, frames=args.frames, force=args.force)
     if args.json:
         print(json.dumps(asdict(done), indent=2))
@@ -191,7 +191,7 @@ def report(done: Series) -> list[str]:
     return lines
 
 
-def warn(done: list[Series]) -> None:
+def warn(args: argparse.Namespace, done: list[Series]) -> None:
     """Print the notes and warnings for the user."""
     from palette4d.lut_export.bake import nearer
     from palette4d.lut_export.bake_error import stated
@@ -206,9 +206,10 @@ def warn(done: list[Series]) -> None:
     }
     for name in shaped:
         if about := shaper_warning(name):
-            tell("warning", about)
+            tell(args, "warning", about)
     if any(entry["clip"] is None for entry in entries):
         tell(
+            args,
             "note",
             "not all of the clip's frames could be read; the errors of the others are measured on "
             "the dense grid (name the clip with --clip)",
@@ -218,6 +219,7 @@ def warn(done: list[Series]) -> None:
         smallest = min((e["size"] for e in missed if e["size"] is not None), default=None)
         worst = stated(max(e["clip"]["delta_e_largest"] for e in missed))
         tell(
+            args,
             "warning",
             f"the error of {counted(len(missed), 'file')} of {len(entries)} can be seen: deltaE "
             f"2000 of up to {worst} on the clip's colours; {nearer(smallest)}",

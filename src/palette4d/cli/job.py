@@ -1,11 +1,12 @@
 """A verb as the job of another program: what it does, as JSON lines.
 
     {"stage": "structure search", "done": 3, "total": 40}    total may be null
-    {"note": TEXT}, {"warning": TEXT}, {"error": TEXT, "fields": true}
+    {"note": PARTS}, {"warning": PARTS}, {"error": PARTS}
     {"finished": true}                                       the last line, after a success
 
-"fields" says that the text names fields of Studio's dialog. `palette4d VERB --progress FILE …`
-writes the lines to a file, or with "-" to standard error.
+PARTS are texts, and between them arguments: {"argument": "force=True", "option": "--force",
+"field": "'Replace existing files'"}; "field", of Studio's dialog, may be null.
+`palette4d VERB --progress FILE …` writes the lines to a file, or to standard error ("-").
 """
 
 from __future__ import annotations
@@ -50,8 +51,12 @@ def on_stderr() -> bool:
     return _stream is sys.stderr
 
 
+def shown(text: str) -> str:
+    """Return a text for an event."""
+    return printable(text)[:LONGEST]
+
+
 def event(**parts: object) -> None:
     """Write an event, if a program waits for it."""
     if _stream is not None:
-        shown = {k: printable(v)[:LONGEST] if isinstance(v, str) else v for k, v in parts.items()}
-        print(json.dumps(shown, ensure_ascii=False), file=_stream, flush=True)
+        print(json.dumps(parts, ensure_ascii=False), file=_stream, flush=True)

@@ -46,7 +46,7 @@ def add_lut_options(parser: argparse.ArgumentParser, default: str | None, *, spa
 def lut_settings(args: argparse.Namespace) -> dict[str, Any]:
     """Return these options as arguments of the API; an impossible --domain is wrong usage."""
     if args.domain is not None and not args.domain[0] < args.domain[1]:
-        args.usage_error("argument --domain: expected two code values, the smaller one first")
+        args.parser.error("argument --domain: expected two code values, the smaller one first")
     names = ("size", "strength", "shaper", "max_error", "space", "ocio_config")
     settings = {name: vars(args)[name] for name in names if name in args}
     domain = None if args.domain is None else tuple(args.domain)

@@ -14,8 +14,7 @@ from collections.abc import Callable, Sequence
 
 from palette4d._core import __version__
 from palette4d.cli import job
-from palette4d.cli.messages import tell
-from palette4d.cli.terminal import printable_output
+from palette4d.cli.terminal import printable_output, tell
 from palette4d.common.arguments import Parser, accept_negative_values
 from palette4d.common.errors import Palette4dError, SidecarError, in_words
 
@@ -101,18 +100,18 @@ def _run(args: argparse.Namespace, stack: contextlib.ExitStack) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except (Palette4dError, OSError) as error:
-        return _report(error)
+        return _report(args, error)
     except KeyboardInterrupt:
         print("palette4d: interrupted", file=sys.stderr)
         return 130
     except Exception as error:
-        job.event(error=str(error) or type(error).__name__)
+        job.event(error=[job.shown(str(error) or type(error).__name__)])
         raise
     return status
 
 
-def _report(error: Exception) -> int:
-    text = in_words(error)
+def _report(args: argparse.Namespace, error: Exception) -> int:
+    text = in_words(error).marked
     broken = isinstance(error, SidecarError) and (error.pointer or "JSON" in error.expected)
     if isinstance(error, SidecarError) and '"palette4d.shots"' in error.found:
         text += (
@@ -121,5 +120,5 @@ def _report(error: Exception) -> int:
         )
     elif broken and "update palette4d" not in text:
         text += "; correct it there, take an earlier copy of the file, or analyse the clip again"
-    tell("error", text)
+    tell(args, "error", text)
     return 1

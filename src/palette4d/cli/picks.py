@@ -8,8 +8,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from palette4d import load
-from palette4d.cli.messages import tell
+from palette4d.cli.progress import frames_bar
 from palette4d.cli.swatches import shown, swatch
+from palette4d.cli.terminal import tell
 from palette4d.common.arguments import ColourAction, number, whole
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted, hex_of
@@ -132,6 +133,7 @@ def _add_where(parser: argparse.ArgumentParser, required: bool = True) -> None:
     )
     parser.add_argument(
         "--float",
+        dest="any_value",
         action="store_true",
         help="take colours such as 255 128 0 as they are, not as integers of 8 bits",
     )
@@ -239,7 +241,7 @@ def run_area(args: argparse.Namespace) -> int:
     before = document.answer(args.id, args.clip, tries=False)
     found = document.add_area(args.id, Area(args.frame, points, size / 2), clip=args.clip)
     document.save()
-    _print_pick(document, args.id, args.clip)
+    _print_pick(args, document, args.id)
     after = document.answer(args.id, args.clip, tries=False)
     if found.kind == "pick" and before and after and abs(after.share - before.share) < 0.002:
         print(
@@ -257,11 +259,11 @@ def run_pick(args: argparse.Namespace) -> int:
         "pixel": args.pixel,
         "box": _box(args) or 1,
         "clip": args.clip,
-        "any_value": args.float,
+        "any_value": args.any_value,
     }
     how = {name: getattr(args, name) for name in (*_RANGE, *_MATTE, "toward", "follow")}
     given = {name: value for name, value in how.items() if value is not None}
-    with _bar(args) as progress:
+    with frames_bar("following", hidden=False) as progress:
         if args.same is not None:
             if args.to is not None or args.by is not None or given:
                 raise Palette4dError(
@@ -281,7 +283,7 @@ def run_pick(args: argparse.Namespace) -> int:
                 args.frame, **where, to=args.to, by=args.by, **given, progress=progress
             )
     document.save()
-    _print_pick(document, found.id, args.clip, followed=args.follow is not False)
+    _print_pick(args, document, found.id, followed=args.follow is not False)
     return 0
 
 
@@ -294,7 +296,7 @@ def run_change(args: argparse.Namespace) -> int:
         name: value for name in parts if (value := getattr(args, name)) is not None
     }
     box = _box(args)
-    with _bar(args) as progress:
+    with frames_bar("following", hidden=False) as progress:
         if args.pixel is not None:
             changes |= {"pixel": args.pixel, "box": box or 1}
             changes["rgb"] = document.colour_of_pixel(
@@ -307,10 +309,10 @@ def run_change(args: argparse.Namespace) -> int:
         if not changes:
             raise Palette4dError("found nothing to change, expected at least one option")
         found = document.change_pick(
-            args.id, any_value=args.float, clip=args.clip, progress=progress, **changes
+            args.id, any_value=args.any_value, clip=args.clip, progress=progress, **changes
         )
     document.save()
-    _print_pick(document, found.id, args.clip, followed=args.follow is not False)
+    _print_pick(args, document, found.id, followed=args.follow is not False)
     return 0
 
 
@@ -356,10 +358,13 @@ def run_picks(args: argparse.Namespace) -> int:
     return 0
 
 
-def _print_pick(document: Document, id_: str, clip: str | None, followed: bool = False) -> None:
+def _print_pick(
+    args: argparse.Namespace, document: Document, id_: str, followed: bool = False
+) -> None:
     """Print what was asked, and what it does in its frame."""
+    clip: str | None = args.clip
     for line in document.pick_warnings(id_, clip):
-        tell("warning", line)
+        tell(args, "warning", line)
     found = next(pick for pick in document.picks if pick.id == id_)
     print(_told(document, found, followed))
     answer = document.answer(id_, clip) if found.enabled else None
@@ -445,9 +450,3 @@ def _box(args: argparse.Namespace) -> int | None:
         raise Palette4dError("found --box without --pixel, expected both or neither")
     box: int | None = args.box
     return box
-
-
-def _bar(args: argparse.Namespace) -> Any:
-    from palette4d.cli.progress import frames_bar
-
-    return frames_bar("following", hidden=False)

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from palette4d.cli.lut_options import wide_help
-from palette4d.cli.messages import tell
+from palette4d.cli.terminal import tell
 from palette4d.common.arguments import times, whole
 from palette4d.plotting import EXTENSIONS
 
@@ -88,6 +88,7 @@ def run(args: argparse.Namespace) -> int:
     if missing:
         which = ", ".join(f"{frame:g}" for frame in missing)
         tell(
+            args,
             "note",
             f"the clip's pixels could not be read at frame {which}; only the palette is drawn "
             "there (name the clip with --clip)",

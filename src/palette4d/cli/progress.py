@@ -34,7 +34,7 @@ def progress_bar(what: str, *, total: int | None, unit: str, hidden: bool) -> An
             now = time.monotonic()
             if msg != "" and (self.n == self.total or now - self.told > BETWEEN):
                 self.told = now
-                stage = self.desc.rstrip(": ").replace("_", " ")
+                stage = job.shown(self.desc.rstrip(": ").replace("_", " "))
                 job.event(stage=stage, done=self.n, total=self.total)
 
     return Events(total=total, desc=what, file=io.StringIO())

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import re
 from typing import TYPE_CHECKING, Any
 
-from palette4d.cli.messages import tell
 from palette4d.cli.reading import add_reading, clip_name
+from palette4d.cli.terminal import tell
 from palette4d.common.arguments import checked, frame_range, number, whole
 from palette4d.common.errors import UnfinishedError
 from palette4d.common.text import counted
@@ -210,7 +211,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--json", action="store_true", help="print what was written as JSON")
     parser.add_argument("--quiet", action="store_true", help="no progress bar, no report")
-    parser.set_defaults(run=run, usage_error=parser.error)
+    parser.set_defaults(run=run)
 
 
 def _show(text: str) -> str:
@@ -231,9 +232,9 @@ def run(args: argparse.Namespace) -> int:
     from palette4d.shows.frames import render
 
     if args.force and args.skip_existing:
-        args.usage_error("--skip-existing keeps files that exist, --force replaces them; use one")
+        args.parser.error("--skip-existing keeps files that exist, --force replaces them; use one")
     if args.skip_bad_frames and args.missing == "error":
-        args.usage_error(
+        args.parser.error(
             "--skip-bad-frames passes over such frames, --missing error stops; use one"
         )
     failed: UnfinishedError | None = None
@@ -258,7 +259,7 @@ def run(args: argparse.Namespace) -> int:
                 cluster=args.cluster,
                 force=args.force,
                 progress=progress,
-                tell=tell,
+                tell=functools.partial(tell, args),
                 **{name: vars(args)[name] for name in DRAWN},
             )
         except UnfinishedError as error:
@@ -266,9 +267,9 @@ def run(args: argparse.Namespace) -> int:
     left_out = sorted(set(done.skipped) - set(done.filled))
     if done.filled:
         shows = "black" if args.missing == "black" else "the frame before"
-        tell("note", f"missing or unreadable {named(done.filled)}: {shows} is shown")
+        tell(args, "note", f"missing or unreadable {named(done.filled)}: {shows} is shown")
     if left_out:
-        tell("note", f"skipped bad {named(left_out)}")
+        tell(args, "note", f"skipped bad {named(left_out)}")
     if args.json:
         print(json.dumps(_report(done), ensure_ascii=True))
     elif not args.quiet:

@@ -1,14 +1,22 @@
-"""What the command line prints: names from files must not act on the terminal."""
+"""What the command line prints: names from files must not act on the terminal.
+
+Messages of the API name its arguments. Here they become the options of the verb.
+"""
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import re
 import sys
 from collections.abc import Iterator
 from typing import Any, TextIO
 
+from palette4d.analysis.options import OPTIONS
+from palette4d.cli import job
+from palette4d.common.message import Arg, Message
 from palette4d.common.text import printable
+from palette4d.studio import texts
 
 # What the command itself sends to terminals: patches of colour (`swatches`).
 _OWN = re.compile(r"(\x1b\[48;2;[0-9]{1,3};[0-9]{1,3};[0-9]{1,3}m  \x1b\[0m )")
@@ -41,3 +49,45 @@ def printable_output() -> Iterator[None]:
     streams: Any = (_Printable(sys.stdout), _Printable(sys.stderr))
     with contextlib.redirect_stdout(streams[0]), contextlib.redirect_stderr(streams[1]):
         yield
+
+
+def option_of(arg: Arg, parser: argparse.ArgumentParser) -> str:
+    """Return an argument of the API as the option of a verb."""
+    given = arg.value is not ... and not isinstance(arg.value, bool)
+    value = str(arg).partition("=")[2].strip('"') if given else ""
+    name = arg.name.removesuffix("_")
+    if name in OPTIONS and name != "vertices":
+        return f"--set {name}={value or '…'}"
+    ours = [action for action in parser._actions if action.dest == arg.name]
+    for action in ours:
+        if action.const is not None and action.const == arg.value:
+            return action.option_strings[-1]
+    flags = [flag for action in ours for flag in action.option_strings if flag.startswith("--")]
+    flag = flags[-1 if arg.value is False else 0] if flags else f"--{name.replace('_', '-')}"
+    return f"{flag} {value}".rstrip()
+
+
+def field_of(arg: Arg) -> str | None:
+    """Return an argument of the API as a field of Studio's dialog, or None."""
+    if str(arg) in texts.FIELDS:
+        return f"'{texts.FIELDS[str(arg)]}'"
+    value = "" if arg.value in (..., True) else f" {arg.value}"
+    return f"'{texts.FIELDS[arg.name]}'{value}" if arg.name in texts.FIELDS else None
+
+
+def tell(args: argparse.Namespace, kind: str, text: str) -> None:
+    """Print a message, and tell it a program that waits: an "error", a "warning" or a "note"."""
+    message = Message(text)
+    job.event(**{kind: [_event(part, args.parser) for part in message.parts]})
+    if not job.on_stderr():
+        words = message.said(lambda arg: option_of(arg, args.parser))
+        print(
+            f"palette4d: {kind}: {words.encode('utf-8', 'backslashreplace').decode()}",
+            file=sys.stderr,
+        )
+
+
+def _event(part: str | Arg, parser: argparse.ArgumentParser) -> object:
+    if isinstance(part, str):
+        return job.shown(part)
+    return {"argument": str(part), "option": option_of(part, parser), "field": field_of(part)}

@@ -17,6 +17,7 @@ from palette4d import _core
 from palette4d.colour.conversion_steps import ConversionError, Step, joined, steps_of
 from palette4d.colour.ocio_config import failures
 from palette4d.colour.ocio_processor import ExactProcessor
+from palette4d.common.message import Arg
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -54,7 +55,7 @@ def conversion(config: Any, source: str, target: str) -> Conversion:
     except failures() as error:
         raise ConversionError(
             f"OpenColorIO cannot convert {source!r} to {target!r} and back: {error}; choose "
-            "another palette_space=…"
+            f"another {Arg('palette_space')}"
         ) from error
     steps: list[Step] = []
     for transform in forward.transforms():
@@ -63,8 +64,8 @@ def conversion(config: Any, source: str, target: str) -> Conversion:
         except ConversionError as error:
             raise ConversionError(
                 f"from {source!r} to {target!r}: {error}; expected matrices and curves of one "
-                "channel only, which have an inverse. Choose another palette_space=…, or convert "
-                "the clip first"
+                f"channel only, which have an inverse. Choose another {Arg('palette_space')}, or "
+                "convert the clip first"
             ) from error
     steps = list(joined(steps))
     chain = _core.ColourConversion(json.dumps(steps), f"{source} to {target}")
@@ -77,7 +78,7 @@ def conversion(config: Any, source: str, target: str) -> Conversion:
         raise ConversionError(
             f"from {source!r} to {target!r}: found a difference of {worst:.2g} between matrices "
             f"and curves and OpenColorIO, expected at most {TOLERANCE:g}; choose another "
-            "palette_space=…, or convert the clip first"
+            f"{Arg('palette_space')}, or convert the clip first"
         )
     return Conversion(steps, chain, worst)
 

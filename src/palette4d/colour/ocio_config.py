@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 
 #: OpenColorIO's oldest config with camera encodings: every host with 2.1 or later reads it.
 BUILT_IN = "ocio://studio-config-v1.0.0_aces-v1.3_ocio-v2.1"
@@ -110,24 +110,27 @@ def chosen_config(given: str | None) -> tuple[Any, str]:
 
     The name of a file is absolute.
     """
-    for name, option in ((given, "ocio_config=…"), (os.environ.get("OCIO") or None, "$OCIO")):
+    for name, option in (
+        (given, f"{Arg('ocio_config')}"),
+        (os.environ.get("OCIO") or None, "$OCIO"),
+    ):
         if name is not None:
             return load_config(name, option), from_anywhere(name) or name
-    return load_config(BUILT_IN, "ocio_config=…"), BUILT_IN
+    return load_config(BUILT_IN, f"{Arg('ocio_config')}"), BUILT_IN
 
 
-def colour_space(config: Any, config_name: str, name: str, what: str) -> Any:
-    """Return the colour space with this name, alias or role; `what` names its source in errors."""
+def colour_space(config: Any, config_name: str, name: str, source: str | Arg) -> Any:
+    """Return the colour space with this name, alias or role; `source` is it, with its place, for "
+    "errors."""
     found = config.getColorSpace(name)
     if found is None:
         raise Palette4dError(
-            f'{what}"{name}": found no such colour space in {config_name}; expected a name, '
+            f"{source}: found no such colour space in {config_name}; expected a name, "
             f"an alias or a role of it, such as {near_spaces(config, name)}"
         )
     if found.isData():
         raise Palette4dError(
-            f'{what}"{name}": in {config_name} that holds data, not colours; expected a colour '
-            "space"
+            f"{source}: in {config_name} that holds data, not colours; expected a colour space"
         )
     return found
 

@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NoReturn
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 
 #: The most frames that a command works on: eleven hours. Dates and ids are not read as frames.
 MAX_FRAMES = 1_000_000
@@ -26,8 +26,13 @@ _FRAMES_ARE = "expected A, A-B or A-BxN with A <= B, or several with commas, suc
 class Parser(argparse.ArgumentParser):
     """A parser with errors of two lines; argparse would print a verb's whole usage first.
 
-    Verbs and their actions inherit it.
+    Verbs and their actions inherit it. The arguments that it parses have it as `parser`.
     """
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        """Make an empty parser."""
+        super().__init__(*args, **options)
+        self.set_defaults(parser=self)
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong on stderr and exit with 2."""
@@ -94,7 +99,7 @@ def frames_between(first: int, last: int, step: int = 1) -> range:
     if (last - first) // step >= MAX_FRAMES:
         raise Palette4dError(
             f"frames {first} to {last} hold more than {MAX_FRAMES} frames; choose fewer, with "
-            "frames=… or a larger step"
+            f"{Arg('frames')} or a larger step"
         )
     return frames
 

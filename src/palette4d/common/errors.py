@@ -1,18 +1,39 @@
-"""The errors of palette4d. Each says what was found, what was expected, and the remedy.
-
-A remedy names an argument of the API as ``force=True`` or ``frames=…``; `palette4d.cli.messages`
-turns these into options.
-"""
+"""The errors of palette4d. Each says what was found, what was expected, and the remedy."""
 
 import errno
 import os
+
+from palette4d.common.message import ANALYZE_SHOTS as ANALYZE_SHOTS
+from palette4d.common.message import Arg as Arg
+from palette4d.common.message import Message as Message
 
 
 class Palette4dError(Exception):
     """An error in the input or the environment that the user can fix.
 
     The command line prints it as ``palette4d: error: …`` and exits with 1.
+
+    Parameters
+    ----------
+    text : str
+        What was found and expected, and what helps.
+    advice : str
+        What helps, where Studio gives other advice.
     """
+
+    def __init__(self, text: str = "", advice: str = "") -> None:
+        """Keep both, also as `args`, so that the error can be pickled."""
+        self.text, self.advice = Message(text), Message(advice)
+        super().__init__(self.text, *[self.advice] * bool(advice))
+
+    def __str__(self) -> str:
+        """Return the message as Python says it."""
+        return str(self.message)
+
+    @property
+    def message(self) -> Message:
+        """The text and the advice, with the arguments that they name."""
+        return Message(f"{self.text.marked} {self.advice.marked}".strip())
 
 
 class UnfinishedError(Palette4dError):
@@ -49,16 +70,18 @@ class SidecarError(Palette4dError):
 
     def __init__(self, file: str, pointer: str, found: str, expected: str) -> None:
         """Store the four parts, also as `args`, so that the error can be pickled."""
-        super().__init__(file, pointer, found, expected)
+        super().__init__()
+        self.args = (file, pointer, found, expected)
         self.file = file
         self.pointer = pointer
         self.found = found
         self.expected = expected
 
-    def __str__(self) -> str:
-        """Return "FILE: POINTER: found X, expected Y", without the parts that are empty."""
+    @property
+    def message(self) -> Message:
+        """ "FILE: POINTER: found X, expected Y", without the parts that are empty."""
         parts = [part for part in (self.file, self.pointer) if part]
-        return ": ".join([*parts, f"found {self.found}, expected {self.expected}"])
+        return Message(": ".join([*parts, f"found {self.found}, expected {self.expected}"]))
 
 
 _REMEDIES = {
@@ -74,18 +97,20 @@ _REMEDIES = {
 }
 
 
-def in_words(error: Exception) -> str:
-    """Return an error as a sentence; for errors of the system it adds the file and the remedy.
+def in_words(error: Exception) -> Message:
+    """Return an error as a message; for errors of the system it adds the file and the remedy.
 
     >>> in_words(FileNotFoundError(errno.ENOENT, "No such file or directory", "a.exr"))
     'a.exr: found no such file or folder; check the path'
     """
+    if isinstance(error, Palette4dError):
+        return error.message
     if not isinstance(error, OSError) or error.strerror is None:
-        return str(error)
+        return Message(str(error))
     reason = error.strerror[:1].lower() + error.strerror[1:]
     remedy = _REMEDIES.get(
         error.errno or 0, f"it cannot be used ({reason}); check the file and its disk"
     )
     if isinstance(error.filename, str | bytes | os.PathLike):
-        return f"{os.fsdecode(error.filename)}: {remedy}"
-    return remedy
+        return Message(f"{os.fsdecode(error.filename)}: {remedy}")
+    return Message(remedy)

@@ -12,14 +12,14 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-from palette4d.common.errors import Palette4dError, WriteError
+from palette4d.common.errors import Arg, Palette4dError, WriteError
 from palette4d.common.locking import remove_left_over
 
 if sys.platform != "win32":
     import fcntl
 
 #: What is said of an output file that exists.
-EXISTS = "found a file there already; choose another name, or replace it with force=True"
+EXISTS = f"found a file there already; choose another name, or replace it with {Arg('force', True)}"
 _TEMPORARY = re.compile(r"\..*\.[0-9a-f]{16}\.p4d-tmp(\.[^.]*)?", re.DOTALL)
 #: Seconds after which a temporary file counts as left over where files cannot be locked.
 _LEFT_OVER_AFTER = 86400.0

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Message, Palette4dError
 from palette4d.common.text import hex_of
 from palette4d.grade import follow
 from palette4d.grade.edits import Colour, as_colour
@@ -37,6 +37,12 @@ OTHER_CLIP = 0.16
 LEAST_REGION = 5e-4
 #: Differences of saturation, twice, and of lightness, within which two clips' colours are the same.
 SAME_COLOUR = (0.05, 0.05, 0.15)
+
+#: The advice for another clip than the palette's.
+OWN_CLIP = Message(
+    f"Give the palette's clip as {Arg('clip')}, or pick by {Arg('colour')} with "
+    f"{Arg('follow', False)}"
+)
 
 
 class ClipOfPicks:
@@ -86,14 +92,15 @@ class ClipOfPicks:
         if (clip.width, clip.height) != (width, height):
             raise Palette4dError(
                 f"{clip.source} has {clip.width}x{clip.height} pixels, but the palette's clip has "
-                f"{width}x{height}: it is another clip. Give the palette's clip as clip=…, or "
-                "pick by colour=… with follow=False"
+                f"{width}x{height}: it is another clip.",
+                OWN_CLIP,
             )
         if missing := [frame for frame in (known[0], known[-1]) if frame not in clip.frames]:
             raise Palette4dError(
                 f"{clip.source} has the frames {describe(clip.frames)}, but not frame "
                 f"{missing[0]} of the palette's clip ({known[0]} to {known[-1]}): it is another "
-                "clip. Give the palette's clip as clip=…, or pick by colour=… with follow=False"
+                "clip.",
+                OWN_CLIP,
             )
         self._clip = clip
         return clip
@@ -114,7 +121,7 @@ class ClipOfPicks:
         if clip is None:
             raise Palette4dError(
                 f"the clip {self._fields['source']!r} is not there, so that its pixels cannot be "
-                "read; give clip=…, or the colour itself with colour=…"
+                f"read; give {Arg('clip')}, or the colour itself with {Arg('colour')}"
             )
         self.check_places(frame, [pixel])
         x, y = pixel
@@ -129,7 +136,7 @@ class ClipOfPicks:
         if not len(found):
             raise Palette4dError(
                 f"the pixel {x:g},{y:g} of frame {frame:g} has no colour: it is transparent or not "
-                "a finite number. Pick another pixel, or a larger box=…"
+                f"a finite number. Pick another pixel, or a larger {Arg('box')}"
             )
         return found if self._conversion is None else self._conversion.to_palette(found)
 
@@ -218,7 +225,8 @@ class ClipOfPicks:
         if unlike > OTHER_CLIP:
             told.append(
                 f"the colours of frame {frame} of {clip.source} differ much from those that were "
-                "analysed; if it is another clip, give the analysed one as clip=…, or analyse it"
+                f"analysed; if it is another clip, give the analysed one as {Arg('clip')}, or "
+                "analyse it"
             )
         away = np.linalg.norm(rgb - pick.rgb, axis=1)
         if away.min() > ALIKE:
@@ -269,7 +277,7 @@ def corrected(pick: Pick, frame: float, rgb: Colour) -> Pick:
     if frame == pick.frame:
         raise Palette4dError(
             f"{pick.id} was picked at frame {frame:g} itself, expected another frame: change its "
-            "colour=… there"
+            f"{Arg('colour')} there"
         )
     keys = {key.frame: key for key in pick.path if key.given and key.frame != pick.frame}
     keys[frame] = PathKey(frame, rgb, True)

@@ -8,7 +8,7 @@ ends of the ramps, also on other edges of vertices that move.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.grade.edits import Colour, Ramp, Setting, as_colour, new_id
 from palette4d.grade.handles import Handles
 
@@ -91,7 +91,7 @@ def range_of(
         if fade is not None:
             raise Palette4dError(
                 "found a fade without a range; expected also its first or its last frame: "
-                "start=… or until=…"
+                f"{Arg('start')} or {Arg('until')}"
             )
         return None
     # Without a first or last frame the range goes on beyond the clip.

@@ -334,7 +334,7 @@ class Document(HandleEdits, PickEdits):
         try:
             state, names = edits.merged(loaded, self._state, new._state, self._taken())
         except Palette4dError as error:
-            raise Palette4dError(f"{self._name}: {error}") from None
+            raise Palette4dError(f"{self._name}: {error.message.marked}") from None
         both = zip(before, self._done, strict=False)
         shared = sum(1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], both))
         steps = [

@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Self
 
 from palette4d import _core
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.grade import edits, sidecar
 from palette4d.grade.edits import (
     RAMP,
@@ -168,7 +168,7 @@ class EditedPalette(Steps):
         scaled = " ".join(f"{value / (2**bits - 1):.4g}" for value in values)
         raise Palette4dError(
             f"found the {what} {shown}, expected code values where 1 is display white; "
-            f"{shown} in {bits} bits is {scaled}. Give that, or add any_value=True if "
+            f"{shown} in {bits} bits is {scaled}. Give that, or add {Arg('any_value', True)} if "
             f"{shown} is meant"
         )
 
@@ -288,7 +288,7 @@ class EditedPalette(Steps):
         if edge in self._settings or edge in self._handles.vertices:
             raise Palette4dError(
                 f"{self.named(edge)} has a time of its own, and only edges get stops; set "
-                f"{edge} itself, without frame=…"
+                f"{edge} itself, without {Arg('frame')}"
             )
         self._handles.check_inside(edge, frame)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import TypedDict, Unpack
 
 from palette4d.colour.oklch import Adjustment, adjuster
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.grade import colour_moves, edits
 from palette4d.grade.edited_palette import EditedPalette, text_of
 from palette4d.grade.edits import RAMP, Change, Colour, Edit, Key, Ramp, Setting, as_colour, as_ramp
@@ -164,7 +164,7 @@ class HandleEdits(EditedPalette):
             if stop in self._handles.vertices:
                 raise Palette4dError(
                     f"{stop} is a palette vertex, whose time the analysis found; only stops move "
-                    "in time. Its colour moves with by=…"
+                    f"in time. Its colour moves with {Arg('by')}"
                 )
             stops = [id_ for id_, setting in self._settings.items() if setting.edge is not None]
             raise unknown(stop, "stop", stops)
@@ -274,8 +274,8 @@ class HandleEdits(EditedPalette):
         change = Adjustment(how.get("hue", 0.0), how.get("chroma", 1.0), how.get("lightness", 1.0))
         if [rgb is None, by is None, change == Adjustment()].count(False) != 1:
             raise Palette4dError(
-                "expected one kind of change: a new colour rgb=…, offsets by=…, or hue=…, "
-                "chroma=… and lightness=…"
+                f"expected one kind of change: a new colour {Arg('rgb')}, offsets {Arg('by')}, or "
+                f"{Arg('hue')}, {Arg('chroma')} and {Arg('lightness')}"
             )
         if by is not None:
             offset = self._offset(by, any_value)
@@ -284,8 +284,8 @@ class HandleEdits(EditedPalette):
             return adjuster(self.encoding, change), str(change)
         if id is None:
             raise Palette4dError(
-                "the whole palette cannot get one colour; expected offsets as by=…, or hue, "
-                "chroma and lightness"
+                f"the whole palette cannot get one colour; expected offsets as {Arg('by')}, or "
+                "hue, chroma and lightness"
             )
         new, at = self._checked(rgb, any_value), self.frame_of(id, frame)
         before = self._colour_on_edge(id, at) if id in self._handles.edges else self.colour(id)

@@ -4,7 +4,7 @@ import difflib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 
 
 class Handles:
@@ -45,7 +45,7 @@ class Handles:
         """Return the error for an edge without a frame."""
         return Palette4dError(
             f"{edge} is an edge, whose colour changes in time; give the frame at which it gets "
-            "one as frame=…"
+            f"one as {Arg('frame')}"
         )
 
     def check_inside(self, edge: str, frame: float) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
+from palette4d.common.message import Arg
 from palette4d.grade.edits import Colour
 
 #: Edits of a palette colour farther away than this hardly change the given colour.
@@ -88,7 +89,8 @@ class Near:
         return (
             f"found no palette colour within {FAR:g} of ({shown}) at frame {self.frame:g}: pixels "
             f"of this colour are a mix of {mixed}. Edit one of these by its id, or pass "
-            f"anyway=True to edit the nearest, {self.id} at ({there}), {self.distance:.3f} away"
+            f"{Arg('anyway', True)} to edit the nearest, {self.id} at ({there}), "
+            f"{self.distance:.3f} away"
         )
 
 

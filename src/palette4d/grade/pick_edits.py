@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.common.text import hex_of
 from palette4d.grade import edits
 from palette4d.grade.colour_moves import range_text
@@ -196,7 +196,7 @@ class PickEdits(Recolouring):
         if of_clip.open() is None:
             raise Palette4dError(
                 f"the clip {self._fields['clip']['source']!r} is not there, so that nothing can be "
-                "learned from its pixels; give clip=…"
+                f"learned from its pixels; give {Arg('clip')}"
             )
         of_clip.check_places(area.frame, area.points)
         found = replace(old, areas=(*old.areas, area), whole_hue=False)

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from palette4d.common.files import make_folder
+from palette4d.common.message import Arg
 from palette4d.grade.document import Document
 from palette4d.grade.movie_rendering import MoviePlan
 from palette4d.grade.output import Output
@@ -308,7 +309,8 @@ def render(
     if movie:
         if half or bits is not None:
             raise OutputError(
-                f"output {output}: half=True and bits=… are for frames, not for movies"
+                f"output {output}: {Arg('half', True)} and {Arg('bits')} are for frames, not for "
+                "movies"
             )
         if skip_existing and Path(output).exists():
             return Rendered([Path(output)], [], [], [], kept=list(clip.frames))
@@ -394,7 +396,9 @@ def with_surroundings(
 def refuse_codec(output: str, codec: str | None, crf: int | None) -> None:
     """Raise an error if frames are asked for with the options of a movie."""
     if codec is not None or crf is not None:
-        raise OutputError(f"output {output}: codec=… and crf=… are for movies, not for frames")
+        raise OutputError(
+            f"output {output}: {Arg('codec')} and {Arg('crf')} are for movies, not for frames"
+        )
 
 
 def opened_for_render(
@@ -417,7 +421,8 @@ def opened_for_render(
         if not skip_bad_frames and (outside := clip.outside):
             raise ClipError(
                 f"{clip.source}: found no {named(outside)}, before its first or behind its last "
-                "frame; choose a range inside, or leave such frames out with skip_bad_frames=True"
+                "frame; choose a range inside, or leave such frames out with "
+                f"{Arg('skip_bad_frames', True)}"
             )
     return clip, "leave out" if skip_bad_frames and not movie else missing
 

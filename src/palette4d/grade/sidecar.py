@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from palette4d import _core
-from palette4d.common.errors import Palette4dError, SidecarError
+from palette4d.common.errors import Arg, Palette4dError, SidecarError
 from palette4d.common.files import link_target, refuse_existing, replacing
 from palette4d.common.locking import locked
 from palette4d.common.text import counted
@@ -378,7 +378,7 @@ def existing(target: Path, on_edits: OnEdits) -> Fields | None:
     except Palette4dError as error:
         raise Palette4dError(
             f"{target} exists and cannot be read as a sidecar ({error}); it may hold edits. "
-            'Move it away, choose another output, or replace it with on_edits="drop"'
+            f"Move it away, choose another output, or replace it with {Arg('on_edits', 'drop')}"
         ) from error
 
 
@@ -392,8 +392,8 @@ def _summary(document: Fields) -> str:
 def _would_lose(target: Path, old: Fields) -> Palette4dError:
     return Palette4dError(
         f"{target} holds edits ({_summary(old)}) that this would lose. "
-        'Keep them with on_edits="keep" (a changed palette gets a copy of the grade), '
-        'discard them with on_edits="drop", or choose another output'
+        f"Keep them with {Arg('on_edits', 'keep')} (a changed palette gets a copy of the grade), "
+        f"discard them with {Arg('on_edits', 'drop')}, or choose another output"
     )
 
 
@@ -406,8 +406,8 @@ def _with_edits_of(old: Fields, new: Fields, target: Path) -> Fields:
     if not same_palette(old, new):
         raise Palette4dError(
             f"{target} holds edits ({_summary(old)}) for a palette that differs from "
-            'the new one, so they cannot be kept. Discard them with on_edits="drop", or choose '
-            "another output"
+            f"the new one, so they cannot be kept. Discard them with {Arg('on_edits', 'drop')}, or "
+            "choose another output"
         )
     names = ("edits", "mattes", "versions", "history")
     users = {name: old[name] for name in names if name in old}

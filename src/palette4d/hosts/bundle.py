@@ -15,7 +15,7 @@ import sys
 from pathlib import Path
 
 from palette4d import _core
-from palette4d.common.errors import Palette4dError, WriteError
+from palette4d.common.errors import Arg, Palette4dError, WriteError
 from palette4d.common.files import replacing, temporary_folder
 from palette4d.hosts.ownership import changeable, runs_as_root
 
@@ -96,7 +96,7 @@ def install_bundle(
         if os.path.lexists(target) and not force and not _is_ours(target):
             raise Palette4dError(
                 f"{target}: found something that is not an OpenFX bundle of Palette4D, "
-                "expected nothing or an earlier version; replace it with force=True"
+                f"expected nothing or an earlier version; replace it with {Arg('force', True)}"
             )
         # Beside the target, so that the rename stays on one file system.
         with temporary_folder(destination) as temporary:
@@ -119,16 +119,17 @@ def install_bundle(
         )
         raise Palette4dError(
             f"{destination}: may not be written to; {who}, or give a folder of your own with "
-            f"dest=… and name it in the environment variable {SEARCH_PATH}"
+            f"{Arg('dest')} and name it in the environment variable {SEARCH_PATH}"
         ) from error
     except OSError as error:
         if os.path.lexists(destination) and not destination.is_dir():
             raise Palette4dError(
                 f"{destination}: found a file, expected a folder for the node; choose another with "
-                "dest=…"
+                f"{Arg('dest')}"
             ) from error
         raise Palette4dError(
-            f"{target}: cannot be installed ({_reason(error)}); choose another folder with dest=…"
+            f"{target}: cannot be installed ({_reason(error)}); choose another folder with "
+            f"{Arg('dest')}"
         ) from error
     return target
 

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from palette4d._core import __version__
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.common.files import make_folder, replacing
 from palette4d.hosts import MARK, kdenlive, shotcut
 
@@ -22,7 +22,7 @@ def data_folder(program: str, platform: str = sys.platform) -> Path:
     if platform != "linux":
         raise Palette4dError(
             f"found the platform {platform}, expected linux: the folder {below} of the program's "
-            f"data is not known here; name it with {program}=…"
+            f"data is not known here; name it with {Arg(program)}"
         )
     # The XDG standard requires programs to ignore relative folders.
     home = Path(os.environ.get("XDG_DATA_HOME", ""))
@@ -50,7 +50,7 @@ def _write(folder: Path, texts: dict[str, str], force: bool) -> list[Path]:
         if os.path.lexists(path) and not force and not _is_ours(path):
             raise Palette4dError(
                 f"{path}: found something that palette4d has not written, expected nothing or an "
-                "earlier version; replace it with force=True"
+                f"earlier version; replace it with {Arg('force', True)}"
             )
     for path, text in zip(paths, texts.values(), strict=True):
         with replacing(path, force=True) as temporary:

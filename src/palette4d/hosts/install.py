@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.hosts.bundle import default_destination, find_bundle, install_bundle
 from palette4d.hosts.editors import data_folder, install_kdenlive, install_shotcut
 
@@ -48,7 +48,9 @@ def install_plugin(
         folder = default_destination() if dest is None else _folder(dest)
         done.append(install_bundle(find_bundle(), folder, link=link, force=force))
     elif link:
-        raise Palette4dError("link=True is for the node; add dest=…, or leave it out")
+        raise Palette4dError(
+            f"{Arg('link', True)} is for the node; add {Arg('dest')}, or leave it out"
+        )
     for program, given, install in (
         ("kdenlive", kdenlive, install_kdenlive),
         ("shotcut", shotcut, install_shotcut),

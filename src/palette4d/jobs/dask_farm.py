@@ -21,7 +21,7 @@ from typing import Any
 
 from palette4d import _core
 from palette4d.colour.ocio_config import from_anywhere
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.jobs.pool import (
     Failed,
     Key,
@@ -216,7 +216,8 @@ def _connected(address: str) -> Iterator[Any]:
         import distributed
     except ImportError as error:
         raise Palette4dError(
-            "cluster=… needs Dask, which is not installed; run: pip install 'palette4d[farm]'"
+            f"{Arg('cluster')} needs Dask, which is not installed; run: pip install "
+            "'palette4d[farm]'"
         ) from error
     encrypted = address.startswith(("tls://", "wss://"))
     if encrypted and distributed.Security().get_tls_config_for_role("client")["ca_file"] is None:
@@ -229,7 +230,7 @@ def _connected(address: str) -> Iterator[Any]:
     except (OSError, TimeoutError, ValueError) as error:
         raise Palette4dError(
             f"no Dask scheduler answers at {address} ({error}); start one with `dask scheduler`, "
-            "workers with `dask worker`, check the address, or use jobs=…"
+            f"workers with `dask worker`, check the address, or use {Arg('jobs')}"
         ) from error
     with _without_log(), client:
         yield client

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Message, Palette4dError
 from palette4d.media.exr_around import Around
 from palette4d.media.stated import Stated
 
@@ -37,9 +37,9 @@ COUNTED_PIXELS = 4_000_000
 MOST_SAMPLES = 1 << 29
 """The most samples of a frame, 13,000 x 13,000 pixels in R, G and B: a small file can state any."""
 
-LEAVE_OUT = (
-    "Bring a good copy, choose a range with frames=…, or leave such frames out with "
-    "skip_bad_frames=True."
+LEAVE_OUT = Message(
+    f"Bring a good copy, choose a range with {Arg('frames')}, or leave such frames out with "
+    f"{Arg('skip_bad_frames', True)}."
 )
 """The advice for a bad frame."""
 
@@ -236,7 +236,8 @@ class Clip(abc.ABC):
         """Return the error for a clip without a good frame."""
         return FrameError(
             f"{self.source}: found none readable of {named(self.frames)}; "
-            "expected at least one good frame. Run without skip_bad_frames=True to see the cause."
+            f"expected at least one good frame. Run without {Arg('skip_bad_frames', True)} to see "
+            "the cause."
         )
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.common.arguments import MAX_FRAMES, parse_frames
+from palette4d.common.message import Arg
 from palette4d.media import exr_layers, oiio_text
 from palette4d.media.clip_base import (
     DEFAULT_RATE,
@@ -145,7 +146,8 @@ class ImageClip(Clip):
             if found != expected:
                 raise FrameError(
                     f"{self.sequence.path(frame)}: frame {frame} has {found}, expected {expected} "
-                    f"as in the frames before. {LEAVE_OUT}"
+                    "as in the frames before.",
+                    LEAVE_OUT,
                 )
 
 
@@ -201,7 +203,7 @@ def open_images(
     if header is None:
         raise FrameError(
             f"{source}: found none readable of {named(wanted)}; expected at least one "
-            "good frame. Run without skip_bad_frames=True to see the cause."
+            f"good frame. Run without {Arg('skip_bad_frames', True)} to see the cause."
         )
     return ImageClip(
         name=sequence.name,
@@ -245,8 +247,8 @@ def _wanted_frames(sequence: ImageSequence, frames: str | None, embedded: str | 
             wanted = parse_frames(frames)
             if outside := sorted(set(wanted) - set(inside)):
                 raise ClipError(
-                    f'{sequence.pattern}: frames="{frames}" includes {describe(outside)}, which '
-                    f"the pattern's own range {embedded} leaves out. Give one of the two."
+                    f"{sequence.pattern}: {Arg('frames', frames)} includes {describe(outside)}, "
+                    f"which the pattern's own range {embedded} leaves out. Give one of the two."
                 )
     elif frames is not None:
         wanted = parse_frames(frames)
@@ -257,7 +259,7 @@ def _wanted_frames(sequence: ImageSequence, frames: str | None, embedded: str | 
             raise ClipError(
                 f"{sequence.pattern}: the {len(found)} files are numbered from {found[0]} to "
                 f"{found[-1]}, which looks like dates or ids; expected frame numbers. "
-                "Number the files, or choose a range with frames=…."
+                f"Number the files, or choose a range with {Arg('frames')}."
             )
         return list(range(found[0], found[-1] + 1, step))
     if not set(wanted) & set(found):
@@ -274,13 +276,13 @@ def _missing(sequence: ImageSequence, missing: list[int]) -> FrameError:
         return FrameError(
             f"{sequence.pattern}: the clip has {named(found)}; {named(outside)} "
             f"{'is' if len(outside) == 1 else 'are'} outside. Choose a range inside the clip with "
-            "frames=…, or leave such frames out with skip_bad_frames=True."
+            f"{Arg('frames')}, or leave such frames out with {Arg('skip_bad_frames', True)}."
         )
     gap = any(found[0] < frame < found[-1] for frame in missing)
     no_file = f" (no file {sequence.path(missing[0]).name})" if gap else ""
     return FrameError(
-        f"{sequence.pattern}: {named(missing)} missing{no_file}, the clip has {describe(found)}. "
-        f"{LEAVE_OUT}"
+        f"{sequence.pattern}: {named(missing)} missing{no_file}, the clip has {describe(found)}.",
+        LEAVE_OUT,
     )
 
 
@@ -305,7 +307,8 @@ def read_header(path: Path, what: str, reading: Reading) -> Header:
 def _unreadable(path: Path, what: str, problem: str) -> FrameError:
     reason = problem.strip().splitlines()[0] if problem.strip() else "no reason given"
     return FrameError(
-        f"{path}: {what} cannot be read ({reason}); expected a whole image file. {LEAVE_OUT}"
+        f"{path}: {what} cannot be read ({reason}); expected a whole image file.",
+        LEAVE_OUT,
     )
 
 

@@ -136,7 +136,8 @@ class MovieClip(Clip):
             why = f" ({self._problem})" if self._problem else ""
             raise FrameError(
                 f"{self.path}: frame {frame} cannot be decoded{why}; expected {self.count} whole "
-                f"frames. {LEAVE_OUT}"
+                "frames.",
+                LEAVE_OUT,
             )
         shape = shape_of(picture)
         if shape != (self.height, self.width, 4 if self.has_alpha else 3):
@@ -144,7 +145,8 @@ class MovieClip(Clip):
             raise FrameError(
                 f"{self.path}: frame {frame} is {width}x{height} pixels with {channels} channels, "
                 f"expected {self.width}x{self.height} with {4 if self.has_alpha else 3} as in the "
-                f"frames before. {LEAVE_OUT}"
+                "frames before.",
+                LEAVE_OUT,
             )
         return picture
 
@@ -252,8 +254,8 @@ def open_movie(
             )
     if wanted[-1] >= packets and not skip_bad_frames:
         raise FrameError(
-            f"{path}: frame {packets} is missing: the file ends after {packets} of {count} frames. "
-            f"{LEAVE_OUT}"
+            f"{path}: frame {packets} is missing: the file ends after {packets} of {count} frames.",
+            LEAVE_OUT,
         )
     height, width, channels = shape_of(first)
     if height * width * channels > MOST_SAMPLES:

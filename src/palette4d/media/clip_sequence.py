@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from palette4d.common.arguments import MAX_FRAMES
+from palette4d.common.message import Arg
 from palette4d.common.text import counted
 from palette4d.media.clip_base import ClipError, describe
 
@@ -199,7 +200,7 @@ def of_pattern(spec: str) -> tuple[ImageSequence, str | None]:
     if sum(abs(int(last) - int(first)) for first, last in ends) > MAX_FRAMES:
         raise ClipError(
             f"{spec}: the pattern's own range holds more than {MAX_FRAMES} frames; expected fewer, "
-            "or one of frames=…"
+            f"or one of {Arg('frames')}"
         )
     try:
         # One `#` means one digit, as in the sidecar's source.

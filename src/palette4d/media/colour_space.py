@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.colour.conversion_chain import TOLERANCE, Comparison, Conversion, conversion
 from palette4d.colour.ocio_config import chosen_config, colour_space, same_encodings
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.media.clip_base import Clip, Fill, FrameError, Image, hidden
 
 F32 = NDArray[np.float32]
@@ -86,7 +86,7 @@ def spaces_of(clip: Clip, options: SpaceOptions) -> Spaces | None:
         raise Palette4dError(
             f"{clip.source}: found no colour space of the clip (its files say {clip.encoding!r}, "
             f"and no rule of {config_name} applies), expected one to go to "
-            f"{options.palette_space!r} from; give it with input_space=…"
+            f"{options.palette_space!r} from; give it with {Arg('input_space')}"
         )
     target = _palette_space(options, config, config_name, source)
     names = str(source.getName()), str(target.getName())
@@ -96,11 +96,12 @@ def spaces_of(clip: Clip, options: SpaceOptions) -> Spaces | None:
 
 def _input_space(clip: Clip, options: SpaceOptions, config: Any, config_name: str) -> Any:
     if options.input_space is not None:
-        return colour_space(config, config_name, options.input_space, "input_space=")
+        given = options.input_space
+        return colour_space(config, config_name, given, Arg("input_space", given))
     path = str(clip.file(clip.frames[0]))
     if not config.filepathOnlyMatchesDefaultRule(path):
         name, _ = config.getColorSpaceFromFilepath(path)
-        return colour_space(config, config_name, name, f"a file rule for {path}: ")
+        return colour_space(config, config_name, name, f"a file rule for {path}: {name!r}")
     for name in same_encodings(clip.encoding):
         space = config.getColorSpace(name)
         if space is not None and not space.isData():
@@ -108,12 +109,13 @@ def _input_space(clip: Clip, options: SpaceOptions, config: Any, config_name: st
     if clip.depth not in FLOATS:
         return None
     name, _ = config.getColorSpaceFromFilepath(path)
-    return colour_space(config, config_name, name, "the default file rule: ")
+    return colour_space(config, config_name, name, f"the default file rule: {name!r}")
 
 
 def _palette_space(options: SpaceOptions, config: Any, config_name: str, source: Any) -> Any:
     if options.palette_space is not None:
-        return colour_space(config, config_name, options.palette_space, "palette_space=")
+        given = options.palette_space
+        return colour_space(config, config_name, given, Arg("palette_space", given))
     if source.getEncoding() != "scene-linear" and not _is_the_role(config, source, "scene_linear"):
         return source
     for name in (*LOG_ROLES, *same_encodings(LOG_SPACE)):
@@ -123,7 +125,7 @@ def _palette_space(options: SpaceOptions, config: Any, config_name: str, source:
     raise Palette4dError(
         f"{config_name}: {source.getName()!r} is scene-linear, in which palettes are of no use, "
         f"and the config has neither the roles {' and '.join(LOG_ROLES)} nor {LOG_SPACE}; name a "
-        "log encoding with palette_space=…"
+        f"log encoding with {Arg('palette_space')}"
     )
 
 
@@ -227,7 +229,7 @@ def record(document: dict[str, Any], clip: Clip, spaces: Spaces | None) -> list[
     if seen.error > TOLERANCE:
         raise Palette4dError(
             f"{ways}: found a difference of {seen.error:.2g} from OpenColorIO on the clip's "
-            f"colours, expected at most {TOLERANCE:g}; choose another palette_space=…"
+            f"colours, expected at most {TOLERANCE:g}; choose another {Arg('palette_space')}"
         )
     document["clip"]["conversion"] = {
         "input_space": spaces.input_space,

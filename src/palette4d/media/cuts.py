@@ -31,6 +31,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from palette4d.common.message import ANALYZE_SHOTS, Arg, Message
 from palette4d.common.text import counted
 from palette4d.media.colour_histogram import mean_shift
 
@@ -116,14 +117,14 @@ def difference(one: F64, other: F64) -> float:
     return float(1 - np.minimum(one, other).sum())
 
 
-def refusal(frames: Sequence[int], cuts: Sequence[int]) -> str:
+def refusal(frames: Sequence[int], cuts: Sequence[int]) -> Message:
     """Return the message that the clip has `cuts`, with the frame ranges to analyse."""
-    shots = [f'frames="{shot}"' for shot in _shots(frames, cuts)]
-    return (
+    shots = [f"{Arg('frames', shot)}" for shot in _shots(frames, cuts)]
+    return Message(
         f"found {counted(len(cuts), 'sudden cut')}: a new shot begins at {_places(cuts)}; expected "
         "one shot, since a palette must not span a cut. Analyse each shot by itself "
-        f"({_some(shots)}; analyze_shots() does all of them), or give allow_cuts=True to analyse "
-        f"all frames as one shot.{_flash(frames, cuts)}"
+        f"({_some(shots)}; {ANALYZE_SHOTS} does all of them), or give {Arg('allow_cuts', True)} to "
+        f"analyse all frames as one shot.{_flash(frames, cuts)}"
     )
 
 
@@ -138,14 +139,16 @@ def _flash(frames: Sequence[int], cuts: Sequence[int]) -> str:
     ]
     if len(lasting) != 1:
         return ""
-    return f' If it is a flash at the end of the clip, leave it out: frames="{lasting[0]}".'
+    only = Arg("frames", lasting[0])
+    return f" If it is a flash at the end of the clip, leave it out: {only}."
 
 
 def refusal_inside(cuts: Sequence[int]) -> str:
     """Return the message that one clip of an edit has `cuts`."""
     return (
         f"found {counted(len(cuts), 'sudden cut')} inside one clip of the edit: a new shot begins "
-        f"at {_places(cuts)}; expected one shot. Blade the edit there, or give allow_cuts=True"
+        f"at {_places(cuts)}; expected one shot. Blade the edit there, or give "
+        f"{Arg('allow_cuts', True)}"
     )
 
 

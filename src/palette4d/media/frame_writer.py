@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
-from palette4d.common.errors import Palette4dError, WriteError
+from palette4d.common.errors import Arg, Palette4dError, WriteError
 from palette4d.common.files import EXISTS, replacing
 from palette4d.media import oiio_text
 from palette4d.media.clip_base import strips
@@ -81,7 +81,7 @@ class FramePattern:
         if parsed.frameSet():
             raise OutputError(
                 f"output {text}: found the range {parsed.frameSet()} in its name, expected "
-                "a pattern such as OUT.####.exr; choose the frames with frames=…"
+                f"a pattern such as OUT.####.exr; choose the frames with {Arg('frames')}"
             )
         return cls(
             path.parent, str(parsed.basename()), str(parsed.extension()), int(parsed.zfill())
@@ -102,7 +102,7 @@ class FramePattern:
         if self.width is None and len(frames) > 1:
             raise OutputError(
                 f"output {self.path(0)}: {len(frames)} frames would go into one file; expected a "
-                f"pattern such as {self.prefix}.####{self.suffix}, or one frame (frames=…)"
+                f"pattern such as {self.prefix}.####{self.suffix}, or one frame ({Arg('frames')})"
             )
         return [self.path(frame) for frame in frames]
 
@@ -152,11 +152,14 @@ def sample_type(extension: str, depth: str, *, half: bool = False, bits: int | N
     if extension == "exr":
         if bits not in (None, 16, 32) or (bits == 32 and half):
             raise OutputError(
-                f"found {bits} bits for EXR, expected 32-bit float, or 16 bits with half=True"
+                f"found {bits} bits for EXR, expected 32-bit float, or 16 bits with "
+                f"{Arg('half', True)}"
             )
         return "half" if half or bits == 16 else "float"
     if half:
-        raise OutputError(f"found half=True for {extension.upper()}, expected it for EXR alone")
+        raise OutputError(
+            f"found {Arg('half', True)} for {extension.upper()}, expected it for EXR alone"
+        )
     if bits is None:
         if extension in ("dpx", "jpg"):
             return "uint10" if extension == "dpx" else "uint8"

@@ -22,6 +22,7 @@ from av.filter import Graph
 from numpy.typing import NDArray
 
 from palette4d.common.files import replacing
+from palette4d.common.message import Arg
 from palette4d.media.clip_base import F32
 from palette4d.media.codecs import Codec, codec_for
 from palette4d.media.colour_tags import LUMA_WEIGHTS, UNKNOWN
@@ -73,7 +74,7 @@ class Delivery:
         if crf is not None and "crf" not in chosen.options:
             raise OutputError(
                 f"output {path}: found crf={crf} for {chosen.name}, expected it for h264 and hevc "
-                "alone; choose codec=…"
+                f"alone; choose {Arg('codec')}"
             )
         if stated.fields and not chosen.interlaced:
             raise OutputError(
@@ -122,7 +123,7 @@ class Delivery:
         if width < least[0] or height < least[1]:
             raise OutputError(
                 f"output {path}: found {width}x{height} pixels for {self.codec.name}, expected at "
-                f"least {least[0]}x{least[1]}; choose another codec=…"
+                f"least {least[0]}x{least[1]}; choose another {Arg('codec')}"
             )
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.colour.ocio_config import from_anywhere
-from palette4d.common.errors import UnfinishedError
+from palette4d.common.errors import Arg, Message, UnfinishedError
 from palette4d.common.text import counted, file_safe
 from palette4d.grade.sidecar import OnEdits
 from palette4d.jobs.workers import Workers
@@ -116,10 +116,10 @@ def analyze_shots(
         source, found, folder, options, lambda done, total, words: tell(words, done, total)
     )
     if notes:
-        done.notes[""] = tuple(notes)
+        done.notes[""] = tuple(map(Message, notes))
     failed = [entry for entry in done.manifest.entries if entry.status == FAILED]
     if failed:
-        lines = "\n".join(f"  {entry.shot.name}: {entry.error}" for entry in failed)
+        lines = "\n".join(f"  {entry.shot.name}: {Message(entry.error).marked}" for entry in failed)
         raise UnfinishedError(
             f"{counted(len(failed), 'shot')} of {len(found)} could not be analysed; the same "
             f"command tries only {'it' if len(failed) == 1 else 'these'} again:\n{lines}",
@@ -138,7 +138,9 @@ def _of_edit(
     found, renamed = shots.numbered(listed)
     notes = [f"not analysed: {note}" for note in edit.notes] + counting
     if timeline_files.is_edl(path) and rate is None:
-        notes.append("an EDL does not state its rate: 24 frames per second are assumed (rate=…)")
+        notes.append(
+            f"an EDL does not state its rate: 24 frames per second are assumed ({Arg('rate')})"
+        )
     if renamed:
         some = ", ".join(renamed[:8]) + (", …" if len(renamed) > 8 else "")
         notes.append(

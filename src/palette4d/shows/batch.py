@@ -18,7 +18,7 @@ from typing import Any
 from palette4d import _core
 from palette4d.analysis import pipeline
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.common.errors import Palette4dError, in_words
+from palette4d.common.errors import Arg, Palette4dError, in_words
 from palette4d.common.files import make_folder
 from palette4d.common.text import counted
 from palette4d.grade import reanalysis, sidecar
@@ -88,7 +88,7 @@ def analyse(
     if unknown := [name for name in options.only if name not in {shot.name for shot in shots}]:
         some = ", ".join(sorted(shot.name for shot in shots)[:8]) + (", …" if shots[8:] else "")
         raise Palette4dError(
-            f"only=…: there is no shot {unknown[0]!r}; expected names such as {some}"
+            f"{Arg('only')}: there is no shot {unknown[0]!r}; expected names such as {some}"
         )
     make_folder(folder)
     show = Show(source, shots, folder, options)
@@ -203,7 +203,7 @@ class Show:
         if sidecar.load(target)["clip"]["source"] != entry.shot.clip:
             raise Palette4dError(
                 f"{target}: a sidecar of another clip is there already; choose another folder, or "
-                "replace it with force=True"
+                f"replace it with {Arg('force', True)}"
             )
 
     def there(self, shot: Shot, before: Entry | None) -> tuple[int, int] | None:

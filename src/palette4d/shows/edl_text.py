@@ -13,7 +13,7 @@ import re
 from collections.abc import Iterator
 from fractions import Fraction
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.media.timecode import frames_of
 
 _TIME = r"([0-9]{1,2}[:;][0-9]{2}[:;][0-9]{2}[:;.,][0-9]{2,3}|[0-9]+)"
@@ -164,7 +164,7 @@ def _count(time: str, index: int, rate: Fraction, drop: bool) -> int:
     if found is None:
         raise Palette4dError(
             f"line {index}: found the timecode {time}, which {float(rate):.6g} frames per second "
-            "do not have; name the rate of the EDL's timecodes with rate=…"
+            f"do not have; name the rate of the EDL's timecodes with {Arg('rate')}"
         )
     return found
 

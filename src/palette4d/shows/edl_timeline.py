@@ -11,7 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.media.clip_base import DEFAULT_RATE
 from palette4d.shows import edl_cdl, edl_text
 from palette4d.shows.edl_text import Event, Motion
@@ -64,7 +64,7 @@ def _check_rate(rate: Fraction, otio: Any) -> None:
     if not otio.opentime.RationalTime.is_smpte_timecode_rate(float(rate)):
         raise Palette4dError(
             f"found the rate {float(rate):.6g}, which has no timecodes; expected 23.976, 24, 25, "
-            "29.97, 30, 48, 50, 59.94 or 60 as rate=…"
+            f"29.97, 30, 48, 50, 59.94 or 60 as {Arg('rate')}"
         )
 
 

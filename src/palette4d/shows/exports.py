@@ -10,7 +10,7 @@ from typing import Any
 
 from palette4d import _core
 from palette4d.common.arguments import parse_frames
-from palette4d.common.errors import Palette4dError, UnfinishedError
+from palette4d.common.errors import Arg, Palette4dError, UnfinishedError
 from palette4d.common.text import counted
 from palette4d.grade.document import Document
 from palette4d.jobs.workers import Workers
@@ -111,17 +111,21 @@ def export(
     path, folder = _file(source), Path(folder)
     show = manifests.is_manifest(path)
     if (every, stops, frames).count(None) + (not stops) != 2:
-        raise Palette4dError("expected one choice of frames: every=…, stops=True or frames=…")
+        raise Palette4dError(
+            f"expected one choice of frames: {Arg('every')}, {Arg('stops', True)} or "
+            f"{Arg('frames')}"
+        )
     for argument, value in (("name", name), ("clip", clip), ("frames", frames)):
         if show and value is not None:
             raise Palette4dError(
-                f"{path}: {argument}=… is not for the manifest of a show, whose shots each have "
+                f"{path}: {Arg(argument)} is not for the manifest of a show, whose shots each have "
                 "their own; leave it out, or export the shots one by one"
             )
     for argument, wanted in (("otio", otio), ("ccc", ccc), ("edl", edl)):
         if wanted is not None and not show:
             raise Palette4dError(
-                f"{path}: {argument}=… needs the manifest of a show (.shots.json); found a sidecar"
+                f"{path}: {Arg(argument)} needs the manifest of a show (.shots.json); found a "
+                "sidecar"
             )
     baked = BakeSettings(format=format_named(format).name, **settings)
     request = Request(path, folder, (), baked, name, padding, clip, force)
@@ -140,8 +144,8 @@ def export(
             edit = timeline_references.source_of(manifest, path, "edl")
             if not timeline_files.is_edl(edit):
                 raise Palette4dError(
-                    f"{path}: its shots are those of {edit.name}; edl=… expects those of an EDL, "
-                    "use otio=…"
+                    f"{path}: its shots are those of {edit.name}; {Arg('edl')} expects those of an "
+                    f"EDL, use {Arg('otio')}"
                 )
         files, notes = sidecars([path])
         requests = [
@@ -235,7 +239,8 @@ def config(
     files, notes = sidecars(given)
     if clip is not None and len(files) > 1:
         raise Palette4dError(
-            f"clip=… is for one sidecar, found {len(files)}; each of them must name its own clip"
+            f"{Arg('clip')} is for one sidecar, found {len(files)}; each of them must name its own "
+            "clip"
         )
     done = write_config(
         files,

@@ -13,7 +13,7 @@ import urllib.request
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.media import clip_sequence
 
 # name.####.exr, name.%04d.exr, name.@@@@.exr, name.[1001-1100].exr, name.1001.exr
@@ -36,7 +36,8 @@ def local_path(url: str) -> Path:
     if parts.scheme == "file":
         return Path(urllib.request.url2pathname(parts.path))
     raise Palette4dError(
-        f"found the media {url!r}, expected a file; relink it, or name its folder with media=…"
+        f"found the media {url!r}, expected a file; relink it, or name its folder with "
+        f"{Arg('media')}"
     )
 
 
@@ -47,7 +48,7 @@ class Folder:
         """List the folder; `Palette4dError` if it is not a folder."""
         if not path.is_dir():
             raise Palette4dError(
-                f"{path}: found no such folder; expected one with media in it for media=…"
+                f"{path}: found no such folder; expected one with media in it for {Arg('media')}"
             )
         self.path = path
         self._by_name: dict[str, list[Path]] = {}

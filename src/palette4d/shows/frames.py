@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from palette4d.common.errors import Palette4dError, UnfinishedError
+from palette4d.common.errors import Arg, Palette4dError, UnfinishedError
 from palette4d.common.files import make_folder, replacing
 from palette4d.common.text import counted
 from palette4d.grade import rendering, sidecar
@@ -95,7 +95,7 @@ def render(
     if cluster is None:
         return rendering.render(document, clip, output, **arguments)
     if isinstance(clip, Clip):
-        raise Palette4dError("cluster=… needs the clip's name, by which workers open it")
+        raise Palette4dError(f"{Arg('cluster')} needs the clip's name, by which workers open it")
     if not isinstance(document, Document):
         document = Document.load(document)
     return _on_farm(document, os.fspath(clip), Path(output), cluster, **arguments)
@@ -127,7 +127,7 @@ def _on_farm(
     if is_movie(output):
         raise Palette4dError(
             f"output {output}: a movie is encoded frame after frame, on one machine; expected "
-            "OUT.####.exr, .png or .tif with cluster=…, or leave cluster=… out"
+            f"OUT.####.exr, .png or .tif with {Arg('cluster')}, or leave {Arg('cluster')} out"
         )
     rendering.refuse_codec(str(output), codec, crf)
     spec = like_source(spec, str(document.core.clip["source"]))
@@ -181,7 +181,8 @@ def _on_farm(
         lines = "\n".join(f"  from frame {frame}: {text}" for frame, text in sorted(failed.items()))
         raise UnfinishedError(
             f"{counted(len(todo) - len(done.frames), 'frame')} of {len(todo)} could not be "
-            f"rendered; the others are there, and skip_existing=True renders only these:\n{lines}",
+            f"rendered; the others are there, and {Arg('skip_existing', True)} renders only "
+            f"these:\n{lines}",
             done,
         )
     if todo and not done.frames:

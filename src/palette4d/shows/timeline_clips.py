@@ -170,7 +170,7 @@ class _Walk:
         except MemoryError:
             raise
         except Exception as error:  # anything may come of a hostile file
-            problem = in_words(error)
+            problem: str = in_words(error)
             if not isinstance(error, Palette4dError):
                 problem = f"its times or names cannot be used ({problem}); mend it in the edit"
             self.clips.append(EditClip(clip.name, place, problem=problem))

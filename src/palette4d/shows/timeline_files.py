@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from palette4d.common.child import Child, ChildError
-from palette4d.common.errors import Palette4dError, in_words
+from palette4d.common.errors import Arg, Palette4dError, in_words
 from palette4d.common.json_files import read_regular
 from palette4d.common.text import counted
 from palette4d.shows import edl_timeline
@@ -76,7 +76,8 @@ def _unreadable(path: Path, error: Exception) -> Palette4dError:
     extension = path.suffix.lower()
     return Palette4dError(
         f"{path}: it cannot be read as a timeline ({_first_line(error)}); expected a whole "
-        f"{extension} file" + (", and its timecodes' rate as rate=…" if extension == ".edl" else "")
+        f"{extension} file"
+        + (f", and its timecodes' rate as {Arg('rate')}" if extension == ".edl" else "")
     )
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from palette4d import _core
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.common.files import refuse_existing, replacing
 from palette4d.common.json_files import read_regular
 from palette4d.lut_export.series import Series
@@ -36,7 +36,7 @@ def source_of(manifest: Manifest, manifest_path: Path, argument: str) -> Path:
     """Return the timeline of a show, which has not changed since; `argument` is for errors."""
     if not manifest.is_timeline:
         raise Palette4dError(
-            f"{manifest_path}: its shots are those of the movie {manifest.source}; {argument}=… "
+            f"{manifest_path}: its shots are those of the movie {manifest.source}; {Arg(argument)} "
             "expects those of a timeline"
         )
     source = Path(manifest.source)

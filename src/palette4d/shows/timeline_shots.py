@@ -13,7 +13,7 @@ from pathlib import Path
 
 from palette4d import _core
 from palette4d.common.child import Child, ChildError
-from palette4d.common.errors import Palette4dError, in_words
+from palette4d.common.errors import Arg, Palette4dError, in_words
 from palette4d.common.text import file_safe
 from palette4d.media import clip_sequence
 from palette4d.media.clip import Clip, open_clip
@@ -137,11 +137,11 @@ class _Finder:
             return str(there)
         what = f"{named!r} is not there" if named else "the edit names no file for it"
         if self.folder is None:
-            help_ = "name the folder that holds it with media=…"
+            help_ = f"name the folder that holds it with {Arg('media')}"
         else:
             looked = " or ".join(map(repr, names)) or "its name"
             what += f", and nothing under {self.folder.path} is called {looked}"
-            help_ = "bring it there, or name another folder with media=…"
+            help_ = f"bring it there, or name another folder with {Arg('media')}"
         raise Palette4dError(f"the media is missing: {what}; {help_}")
 
     def frames(self, clip: EditClip, spec: str, media: Media) -> tuple[int, int]:

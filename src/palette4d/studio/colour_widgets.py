@@ -79,9 +79,28 @@ class Swatch(QWidget):
 
 
 class Keyed(QWidget):
-    """A part whose value the arrows change: they do nothing else while it has the keyboard."""
+    """A part whose value drags and arrows change; arrows do nothing else meanwhile."""
 
+    let_go = Signal()
     KEYS: tuple[Qt.Key, ...] = (Qt.Key.Key_Left, Qt.Key.Key_Right)
+
+    def _touch(self, event: QMouseEvent) -> None:
+        """Take the value under the pointer."""
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Take a value."""
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._touch(event)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Take others."""
+        if event.buttons() & Qt.MouseButton.LeftButton:
+            self._touch(event)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """End the drag."""
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.let_go.emit()
 
     def event(self, event: QEvent) -> bool:
         """Keep the arrows from the menus."""
@@ -97,7 +116,6 @@ class Wheel(Keyed):
     """Hue around, chroma outwards, at one lightness; what cannot be displayed is dimmed."""
 
     moved = Signal(object)  #: (chroma, hue)
-    let_go = Signal()
     KEYS = (*Keyed.KEYS, Qt.Key.Key_Up, Qt.Key.Key_Down)
 
     def __init__(self) -> None:
@@ -207,9 +225,10 @@ class Wheel(Keyed):
             self._picture = key, paint.image_of(picture.astype(np.uint8))
         return self._picture[1]
 
-    def _emit(self, at: QPointF, event: QMouseEvent) -> None:
+    def _touch(self, event: QMouseEvent) -> None:
+        """Change hue and chroma; Shift keeps the chroma, Ctrl the hue."""
         centre, radius = self._circle()
-        away = at - centre
+        away = event.position() - centre
         chroma = math.hypot(away.x(), away.y()) / radius * self._rim
         hue = math.degrees(math.atan2(-away.y(), away.x())) % 360
         keys = event.modifiers()
@@ -218,21 +237,6 @@ class Wheel(Keyed):
         elif keys & Qt.KeyboardModifier.ControlModifier:
             hue = float(self.lch[2])
         self.moved.emit((min(chroma, self._rim), hue))
-
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Choose hue and chroma."""
-        if event.button() == Qt.MouseButton.LeftButton:
-            self._emit(event.position(), event)
-
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Change hue and chroma; Shift keeps the chroma, Ctrl the hue."""
-        if event.buttons() & Qt.MouseButton.LeftButton:
-            self._emit(event.position(), event)
-
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        """End the drag."""
-        if event.button() == Qt.MouseButton.LeftButton:
-            self.let_go.emit()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Left and right turn the hue, up and down change the chroma."""
@@ -251,7 +255,6 @@ class Bar(Keyed):
     """A value on a gradient of the colours that it leads to."""
 
     moved = Signal(float)
-    let_go = Signal()
 
     def __init__(self, name: str, step: float) -> None:
         """Begin at 0."""
@@ -315,20 +318,8 @@ class Bar(Keyed):
         share = (x - 5) / max(self.width() - 10, 1)
         return self.low + min(max(share, 0.0), 1.0) * (self.high - self.low)
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Choose a value."""
-        if event.button() == Qt.MouseButton.LeftButton:
-            self.moved.emit(self._value_at(event.position().x()))
-
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Change the value."""
-        if event.buttons() & Qt.MouseButton.LeftButton:
-            self.moved.emit(self._value_at(event.position().x()))
-
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        """End the drag."""
-        if event.button() == Qt.MouseButton.LeftButton:
-            self.let_go.emit()
+    def _touch(self, event: QMouseEvent) -> None:
+        self.moved.emit(self._value_at(event.position().x()))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Left and right change the value by a step."""
@@ -391,12 +382,10 @@ class Span(Bar):
             x = event.position().x()
             low, high = map(self._x, self.span)
             self._upper = abs(x - high) < abs(x - low)
-            self._move(self._value_at(x))
+            self._touch(event)
 
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Move it."""
-        if event.buttons() & Qt.MouseButton.LeftButton:
-            self._move(self._value_at(event.position().x()))
+    def _touch(self, event: QMouseEvent) -> None:
+        self._move(self._value_at(event.position().x()))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Left and right move an end by a step; up and down choose which."""

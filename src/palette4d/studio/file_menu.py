@@ -129,15 +129,3 @@ class FileMenu:
         if self.session.player is not None:
             self.session.player.forget_errors()
             self.window.viewer.read_frame()
-
-    def quit(self) -> None:
-        """Close the window."""
-        self.window.close()
-
-    def next_shot(self) -> None:
-        """Open the next shot of the list."""
-        self.window.shots.step(1)
-
-    def previous_shot(self) -> None:
-        """Open the shot before."""
-        self.window.shots.step(-1)

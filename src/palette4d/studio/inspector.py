@@ -29,6 +29,7 @@ from PySide6.QtWidgets import (
 
 from palette4d.colour.oklch import Adjustment, Lch
 from palette4d.common.errors import Palette4dError
+from palette4d.common.text import hex_of
 from palette4d.grade.document import Document
 from palette4d.grade.edits import RAMPS, as_colour
 from palette4d.grade.follow import Progress
@@ -42,7 +43,7 @@ from palette4d.studio.pick_panel import PickPanel
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
 from palette4d.studio.states import Place
-from palette4d.studio.targets import PickTo, Recolour, RecolourMany, Target, hex_of, target_of
+from palette4d.studio.targets import PickTo, Recolour, RecolourMany, Target, target_of
 
 F64 = NDArray[np.float64]
 U8 = NDArray[np.uint8]
@@ -325,7 +326,7 @@ class Inspector(QWidget):
         convert = (lch, self.shown, (self._lch and self._lch[0], self.session.looked))
         self.wheel.show_colour(now, origin, [lch.of(o.after) for o in others], convert)
         self._show_bars(now, origin, target)
-        self.hex.setText(hex_of(self.in_clip(target.after)))
+        self.hex.setText(hex_of(self.in_clip(target.after).tolist()).rstrip("*"))
         self.shown_hex.setText(f"{texts.ON_SCREEN} #{bytes(after.tolist()).hex()}")
 
     def _show_bars(self, now: F64, origin: F64, target: Target) -> None:

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from typing import IO
+from typing import IO, Any
 
 from palette4d.common.json_files import parse
 
@@ -48,6 +48,8 @@ class Job:
         How much of it is done, 0..1; None if unknown.
     output, messages : str
         What it printed, and its notes and errors.
+    advised : list of str
+        The options that these name.
     status : int or None
         The exit status; None while it runs.
     """
@@ -57,6 +59,7 @@ class Job:
         self.words = tuple(words)
         self.what, self.fraction = "", None  # type: tuple[str, float | None]
         self.output = self.messages = ""
+        self.advised: list[str] = []
         self.status: int | None = None
         self.cancelled = False
         self._changed = changed
@@ -118,9 +121,10 @@ class Job:
             if "stage" in event:
                 self.what, total = str(event["stage"]), event["total"]
                 self.fraction = min(max(event["done"] / total, 0.0), 1.0) if total else None
-            for kind in ("note", "warning", "error"):
-                if kind in event:
-                    self.messages += f"{kind}: {event[kind]}\n"
+            for kind in {"note", "warning", "error"} & event.keys():
+                named = [part for part in event[kind] if not isinstance(part, str)]
+                self.advised += [str(part["option"]) for part in named]
+                self.messages += f"{kind}: {''.join(map(_said, event[kind]))}\n"
         except (ValueError, TypeError, KeyError, OverflowError):
             self.messages += line.decode("utf-8", "replace")
         self._changed(self)
@@ -132,6 +136,11 @@ class Job:
         self._events.join(GRACE)
         self.status = status
         self._changed(self)
+
+
+def _said(part: Any) -> str:
+    """Return a part of a message: a text, or an argument, which has a field or an option."""
+    return part if isinstance(part, str) else str(part["field"] or part["option"])
 
 
 def _lines(pipe: IO[bytes] | None) -> Iterator[bytes]:

@@ -1,7 +1,7 @@
-"""The actions of the menus Edit, Palette, View and Playback.
+"""The actions of the menus.
 
-Each action of `menu_entries.ACTIONS` is a method of its name here, or in `file_menu`, `verb_menu`
-or `help_menu`.
+Each action of `menu_entries.ACTIONS` is in `MenuActions.calls`, or a method of its name here, in
+`file_menu`, `verb_menu` or `help_menu`.
 """
 
 from collections.abc import Callable
@@ -26,17 +26,63 @@ class MenuActions:
     """What the menus do with the session and the views of a window."""
 
     def __init__(self, window: "Window") -> None:
-        self.window, self.session, self.viewer = window, window.session, window.viewer
+        session, viewer = window.session, window.viewer
+        self.window, self.session, self.viewer = window, session, viewer
+        #: The actions of one call.
+        self.calls: dict[str, Callable[[], object]] = {
+            "next_shot": lambda: window.shots.step(1),
+            "previous_shot": lambda: window.shots.step(-1),
+            "quit": window.close,
+            "undo": session.undo,
+            "redo": session.redo,
+            "reset_selected": lambda: grade_steps.reset(session),
+            "reset_all": lambda: grade_steps.reset_all(session),
+            "add_stop": lambda: window.timeline.add_stop_at_playhead(),
+            "lock": lambda: grade_steps.lock(session),
+            "act_from": lambda: self._set_range(start=float(session.frame)),
+            "act_until": lambda: self._set_range(until=float(session.frame)),
+            "ramp_linear": lambda: grade_steps.set_ramp(session, "linear"),
+            "ramp_smooth": lambda: grade_steps.set_ramp(session, "smooth"),
+            "ramp_hold": lambda: grade_steps.set_ramp(session, "hold"),
+            "pick_pixel": lambda: self._at_pointer(viewer.on_pick),
+            "hold_pixel": lambda: self._at_pointer(viewer.on_hold),
+            "save_version": lambda: grade_steps.keep_version(session),
+            "show_after": lambda: session.look(compare="after"),
+            "show_before": lambda: session.look(compare="before"),
+            "show_wipe": lambda: session.look(compare="wipe"),
+            "show_side": lambda: session.look(compare="side"),
+            "fit": viewer.fit,
+            "one_to_one": lambda: viewer.zoom_to(1.0, viewer.pointer),
+            "zoom_in": lambda: viewer.zoom_by(ZOOM, viewer.pointer),
+            "zoom_out": lambda: viewer.zoom_by(1 / ZOOM, viewer.pointer),
+            "outside": lambda: session.look(outside=not session.view.outside),
+            "matte": lambda: session.look(matte=not session.view.matte),
+            "brighter": lambda: session.look(
+                exposure=min(session.view.exposure + EXPOSURE_STEP, EXPOSURE)
+            ),
+            "darker": lambda: session.look(
+                exposure=max(session.view.exposure - EXPOSURE_STEP, -EXPOSURE)
+            ),
+            "plain_look": lambda: session.look(exposure=0.0, gamma=1.0),
+            "full_screen": lambda: window.setWindowState(
+                window.windowState() ^ Qt.WindowState.WindowFullScreen
+            ),
+            "play": lambda: session.play(0 if session.playing else 1),
+            "stop": lambda: session.play(0),
+            "play_forwards": lambda: self._shuttle(1),
+            "play_backwards": lambda: self._shuttle(-1),
+            "next_frame": lambda: self._step(1),
+            "previous_frame": lambda: self._step(-1),
+            "ten_on": lambda: self._step(10),
+            "ten_back": lambda: self._step(-10),
+            "first_frame": lambda: session.go(window.playback.span()[0]),
+            "last_frame": lambda: session.go(window.playback.span()[1]),
+            "mark_in": lambda: session.mark(start=session.frame),
+            "mark_out": lambda: session.mark(end=session.frame),
+            "clear_marks": session.mark,
+        }
 
     # ------------------------------------------------------------------------------------ editing
-
-    def undo(self) -> None:
-        """Undo."""
-        self.session.undo()
-
-    def redo(self) -> None:
-        """Redo."""
-        self.session.redo()
 
     def cancel(self) -> None:
         """Forget a drag; else select nothing."""
@@ -49,30 +95,6 @@ class MenuActions:
         else:
             self.session.select()
 
-    def reset_selected(self) -> None:
-        """Reset the selected vertices, remove stops and picks."""
-        grade_steps.reset(self.session)
-
-    def reset_all(self) -> None:
-        """Reset everything."""
-        grade_steps.reset_all(self.session)
-
-    def add_stop(self) -> None:
-        """Add a stop to the selected row at the playhead."""
-        self.window.timeline.add_stop_at_playhead()
-
-    def lock(self) -> None:
-        """Lock or unlock the selected handles."""
-        grade_steps.lock(self.session)
-
-    def act_from(self) -> None:
-        """Have the selected pick or hold begin at the playhead."""
-        self._set_range(start=float(self.session.frame))
-
-    def act_until(self) -> None:
-        """Have the selected pick or hold end at the playhead."""
-        self._set_range(until=float(self.session.frame))
-
     def _set_range(self, start: float | None = None, until: float | None = None) -> None:
         pick = self.session.picked
         if pick is None:
@@ -84,26 +106,6 @@ class MenuActions:
             begin = min(begin, end)
         grade_steps.set_range(self.session, pick.id, begin, max(begin, end))
 
-    def ramp_linear(self) -> None:
-        """Set the ramp."""
-        grade_steps.set_ramp(self.session, "linear")
-
-    def ramp_smooth(self) -> None:
-        """Set the ramp."""
-        grade_steps.set_ramp(self.session, "smooth")
-
-    def ramp_hold(self) -> None:
-        """Set the ramp."""
-        grade_steps.set_ramp(self.session, "hold")
-
-    def pick_pixel(self) -> None:
-        """Pick the colour under the pointer."""
-        self._at_pointer(self.viewer.on_pick)
-
-    def hold_pixel(self) -> None:
-        """Hold the colour under the pointer."""
-        self._at_pointer(self.viewer.on_hold)
-
     def _at_pointer(self, act: Callable[[Any], object] | None) -> None:
         point = self.viewer.pointer
         if point is None or act is None:
@@ -114,10 +116,6 @@ class MenuActions:
             act(place)
 
     # ----------------------------------------------------------------------------------- versions
-
-    def save_version(self) -> None:
-        """Keep the edits as the next version: A, B, C…"""
-        grade_steps.keep_version(self.session)
 
     def use_version(self, number: int) -> None:
         """Use the n-th version."""
@@ -145,104 +143,16 @@ class MenuActions:
 
     # --------------------------------------------------------------------------------------- view
 
-    def show_after(self) -> None:
-        """Show the picture after."""
-        self.session.look(compare="after")
-
-    def show_before(self) -> None:
-        """Show the picture before."""
-        self.session.look(compare="before")
-
-    def show_wipe(self) -> None:
-        """Show both, divided by a line."""
-        self.session.look(compare="wipe")
-
-    def show_side(self) -> None:
-        """Show both."""
-        self.session.look(compare="side")
-
     def compare(self) -> None:
         """Show the other picture; the key does so while it is down."""
         after = self.session.view.compare != "before"
         self.session.look(compare="before" if after else "after")
 
-    def fit(self) -> None:
-        """Show the whole frame."""
-        self.viewer.fit()
-
-    def one_to_one(self) -> None:
-        """Show a pixel of the frame as a pixel of the screen."""
-        self.viewer.zoom_to(1.0, self.viewer.pointer)
-
-    def zoom_in(self) -> None:
-        """Zoom in."""
-        self.viewer.zoom_by(ZOOM, self.viewer.pointer)
-
-    def zoom_out(self) -> None:
-        """Zoom out."""
-        self.viewer.zoom_by(1 / ZOOM, self.viewer.pointer)
-
-    def outside(self) -> None:
-        """Mark colours outside of the palette."""
-        self.session.look(outside=not self.session.view.outside)
-
-    def matte(self) -> None:
-        """Show the matte of the selected pick, or no more."""
-        self.session.look(matte=not self.session.view.matte)
-
-    def brighter(self) -> None:
-        """Raise the exposure."""
-        self.session.look(exposure=min(self.session.view.exposure + EXPOSURE_STEP, EXPOSURE))
-
-    def darker(self) -> None:
-        """Lower the exposure."""
-        self.session.look(exposure=max(self.session.view.exposure - EXPOSURE_STEP, -EXPOSURE))
-
-    def plain_look(self) -> None:
-        """Reset exposure and gamma."""
-        self.session.look(exposure=0.0, gamma=1.0)
-
-    def full_screen(self) -> None:
-        """Fill the screen, or no more."""
-        self.window.setWindowState(self.window.windowState() ^ Qt.WindowState.WindowFullScreen)
-
     # ----------------------------------------------------------------------------------- playback
-
-    def play(self) -> None:
-        """Play or stop."""
-        self.session.play(0 if self.session.playing else 1)
-
-    def stop(self) -> None:
-        """Stop."""
-        self.session.play(0)
-
-    def play_forwards(self) -> None:
-        """Play forwards; again: faster."""
-        self._shuttle(1)
-
-    def play_backwards(self) -> None:
-        """Play backwards; again: faster."""
-        self._shuttle(-1)
 
     def _shuttle(self, way: int) -> None:
         now = self.session.playing
         self.session.play(way if now * way <= 0 else max(-FASTEST, min(FASTEST, now * 2)))
-
-    def next_frame(self) -> None:
-        """Go one frame on."""
-        self._step(1)
-
-    def previous_frame(self) -> None:
-        """Go one frame back."""
-        self._step(-1)
-
-    def ten_on(self) -> None:
-        """Go ten frames on."""
-        self._step(10)
-
-    def ten_back(self) -> None:
-        """Go ten frames back."""
-        self._step(-10)
 
     def _step(self, frames: int) -> None:
         if self.session.playing:
@@ -270,26 +180,6 @@ class MenuActions:
         times |= {s.frame for s in document.settings.values() if s.frame is not None}
         first, last, _ = document.frames
         return sorted({round(min(max(time, first), last)) for time in times})
-
-    def first_frame(self) -> None:
-        """Go to the first frame, or to the in point."""
-        self.session.go(self.window.playback.span()[0])
-
-    def last_frame(self) -> None:
-        """Go to the last frame, or to the out point."""
-        self.session.go(self.window.playback.span()[1])
-
-    def mark_in(self) -> None:
-        """Set the in point."""
-        self.session.mark(start=self.session.frame)
-
-    def mark_out(self) -> None:
-        """Set the out point."""
-        self.session.mark(end=self.session.frame)
-
-    def clear_marks(self) -> None:
-        """Remove in and out point."""
-        self.session.mark()
 
     def loop(self) -> None:
         """Begin again at the end, or no more."""

@@ -13,7 +13,7 @@ class Action:
     Attributes
     ----------
     name : str
-        The method that does it.
+        Its name in `menu_actions`, or in the view.
     menu : str
         The menu: a key of `texts.MENUS`.
     keys : tuple of str
@@ -119,8 +119,8 @@ ACTIONS = (
 
 _timeline = functools.partial(Action, view="timeline")
 _solid = functools.partial(Action, view="solid")
-#: Actions of the timeline and of the solid: `name` is the view's method. Their keys work while
-#: the view has the keyboard, their menu entries always.
+#: Actions of the timeline and of the solid. Their keys work while the view has the keyboard, their
+#: menu entries always.
 TIMELINE_ACTIONS = (
     _timeline("select_all", PALETTE, ("Ctrl+A",)),
     _timeline("next_handle", PALETTE, ("Tab",)),

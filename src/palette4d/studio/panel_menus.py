@@ -1,6 +1,6 @@
 """Menu entries of the views: the timeline and the solid do their actions themselves."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeySequence
@@ -12,8 +12,10 @@ from palette4d.studio.menu_entries import Action
 OWN_KEYS = ("Tab", "Shift+Tab")
 
 
-def view_actions(view: QWidget, actions: Iterable[Action]) -> dict[str, list[QAction]]:
-    """Return the entries for a view's actions by menu; each calls the view's method of its name."""
+def view_actions(
+    view: QWidget, actions: Iterable[Action], calls: Mapping[str, Callable[[], object]]
+) -> dict[str, list[QAction]]:
+    """Return the entries for a view's actions by menu; `calls` do them."""
     result: dict[str, list[QAction]] = {}
     for action in actions:
         made = QAction(action.text, view)
@@ -22,8 +24,7 @@ def view_actions(view: QWidget, actions: Iterable[Action]) -> dict[str, list[QAc
         else:
             made.setShortcuts([QKeySequence(keys) for keys in action.keys])
         made.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
-        method = getattr(view, action.name)
-        made.triggered.connect(lambda _=False, method=method: method())
+        made.triggered.connect(lambda _=False, call=calls[action.name]: call())
         view.addAction(made)
         result.setdefault(action.menu, []).append(made)
     return result

@@ -18,11 +18,9 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from palette4d.common.errors import in_words
 from palette4d.media.clip import Clip
-from palette4d.media.clip_base import LEAVE_OUT
 from palette4d.media.clip_movie import MovieClip
-from palette4d.studio import texts
+from palette4d.studio.session_events import words_of
 
 F32 = NDArray[np.float32]
 F16 = NDArray[np.float16]
@@ -240,8 +238,7 @@ class Player:
             try:
                 self._take(number, region)
             except Exception as error:  # a decoder may fail in any way: the window stays
-                words = in_words(error) or type(error).__name__
-                self.errors[number] = words.replace(LEAVE_OUT, texts.BAD_FRAME)
+                self.errors[number] = words_of(error)
             finally:
                 with self._wake:
                     self._reading.discard((number, region))

@@ -3,9 +3,14 @@
 from collections.abc import Callable
 from typing import Literal
 
-from palette4d.common.errors import in_words
+from palette4d.common.errors import Palette4dError, in_words
+from palette4d.grade.clip_of_picks import OWN_CLIP
+from palette4d.media.clip_base import LEAVE_OUT
 from palette4d.studio import texts
 from palette4d.studio.states import Status
+
+#: The advice of the API, and the window's.
+ADVICE = {LEAVE_OUT: texts.BAD_FRAME, OWN_CLIP: texts.OWN_CLIP}
 
 Event = Literal[
     "document",  # the palette or its edits, also of every step of a drag
@@ -75,7 +80,11 @@ class Events:
 
     def report(self, error: Exception) -> None:
         """Show an error as the status."""
-        words = in_words(error)
-        for remedy, here in texts.REMEDIES.items():
-            words = words.replace(remedy, here)
-        self.say(words, "error")
+        self.say(words_of(error), "error")
+
+
+def words_of(error: Exception) -> str:
+    """Return an error as a sentence, with the window's own advice where it has some."""
+    if isinstance(error, Palette4dError) and error.advice in ADVICE:
+        return f"{error.text} {ADVICE[error.advice]}"
+    return in_words(error) or type(error).__name__

@@ -80,7 +80,11 @@ class SolidView(QWidget):
         self._pixels: tuple[object, F64, NDArray[np.uint8]] | None = None
         self._extent: F64 | None = None
         self.painter = SolidPainter(self)
-        self.menu_actions = view_actions(self, SOLID_ACTIONS)
+        self.menu_actions = view_actions(
+            self,
+            SOLID_ACTIONS,
+            {"next_colour": lambda: self._step(True), "reset_view": self.reset_view},
+        )
         for event in ("document", "clip", "frame", "selection", "hover", "view"):
             session.on(event, self.update, panel=True)
         session.on("pixels", self._pixels_arrived, panel=True)
@@ -297,10 +301,6 @@ class SolidView(QWidget):
     def focusNextPrevChild(self, forward: bool) -> bool:
         """Tab goes through the colours, and then to the next panel."""
         return self._step(forward) or super().focusNextPrevChild(forward)
-
-    def next_colour(self) -> None:
-        """Select the next colour."""
-        self._step(True)
 
     def _step(self, forward: bool) -> bool:
         """Select the next colour or the one before; return whether there is one."""

@@ -6,7 +6,7 @@ picked yet. Each edit is that of a verb: `edit set`, `track`, `palette`, `pick` 
 
 import contextlib
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -203,14 +203,3 @@ class RecolourMany:
                 chroma=change.chroma,
                 lightness=change.lightness,
             )
-
-
-def hex_of(rgb: Any) -> str:
-    """Return #rrggbb of code values 0..1; a note where they are outside of it.
-
-    >>> hex_of([1.0, 0.0, 0.2])
-    '#ff0033'
-    """
-    values = np.asarray(rgb, dtype=np.float64)
-    inside = np.rint(np.clip(values, 0, 1) * 255).astype(int).tolist()
-    return "#" + bytes(inside).hex()

@@ -17,12 +17,7 @@ CLIP_MISSING = (
 OTHER_SIZE = (
     "the palette is of a clip with {own} pixels, this clip has {found}: check that it is the clip"
 )
-#: What errors of the API advise, and what the window offers.
-REMEDIES = {
-    "Give the palette's clip as clip=…, or pick by colour=… with follow=False": (
-        "File > Find the clip… opens the palette's own"
-    ),
-}
+OWN_CLIP = "File > Find the clip… opens the palette's own"
 LACKS_FRAMES = "the clip lacks {count} frames of the palette, the first is {first}"
 UNDONE = "undone"
 REDONE = "redone"
@@ -296,25 +291,13 @@ SHOW = "Edit"
 SIDECAR = "Sidecar"
 OUTPUT = "Output"
 FOLDER = "Folder"
-FRAMES = "Frames"
 FRAMES_HINT = "all, or 1001-1100x2"
-VERTICES = "Most handles"
 VERTICES_HINT = "all that are worth it"
-INPUT_SPACE = "Clip's colour space"
-PALETTE_SPACE = "Palette's colour space"
 SPACE_HINT = "as the file says"
-CONFIG = "OpenColorIO config"
-BASE_CONFIG = "Config to extend"
 EDITS = "Edits of an existing sidecar"
 EDITS_NAMES = ("refuse if there are any", "keep", "drop")
-SKIP_BAD = "Skip bad frames"
-ALLOW_CUTS = "Allow cuts"
-DETECT_SHOTS = "Split at cuts, a sidecar a shot"
-MEDIA = "Media of the edit"
 MEDIA_HINT = "where the edit says"
-LIKE = "Like an earlier version"
 LIKE_HINT = "a new palette"
-METHOD = "Method"
 METHOD_HINT = "the best"
 SETTINGS = "Settings"
 SETTINGS_HINT = "NAME=VALUE, see palette4d analyze --help-all"
@@ -322,12 +305,29 @@ COMPARE_LABEL = "With the source"
 BITS = "Bits a sample"
 BITS_HINT = "as the clip"
 NO_COMPARE = "no"
-HALF = "Half floats (EXR)"
-FORCE = "Replace existing files"
-GRID = "Grid points"
-EVERY = "Every n-th frame"
 FORMAT = "Format"
 LINK = "Link, do not copy"
+#: The fields that arguments of the API have in the dialogs, by name or with their value.
+FIELDS = {
+    'on_edits="keep"': f"{EDITS}: {EDITS_NAMES[1]}",
+    'on_edits="drop"': f"{EDITS}: {EDITS_NAMES[2]}",
+    "detect_shots": "Split at cuts, a sidecar a shot",
+    "frames": "Frames",
+    "skip_bad_frames": "Skip bad frames",
+    "allow_cuts": "Allow cuts",
+    "input_space": "Clip's colour space",
+    "palette_space": "Palette's colour space",
+    "ocio_config": "OpenColorIO config",
+    "vertices": "Most handles",
+    "method": "Method",
+    "like": "Like an earlier version",
+    "media": "Media of the edit",
+    "force": "Replace existing files",
+    "half": "Half floats (EXR)",
+    "size": "Grid points",
+    "every": "Every n-th frame",
+    "base": "Config to extend",
+}
 
 # --------------------------------------------------------------------------------------- the help
 FIRST_STEPS = "First steps"

@@ -84,7 +84,22 @@ class TimelineView(QWidget):
         self.strip = FrameStrip(session, self.places, self._strip_changed)
         self.painter = TimelinePainter(self, session, self.places, self.strip)
         self._press: Press | None = None
-        self.menu_actions = view_actions(self, TIMELINE_ACTIONS)
+        self.menu_actions = view_actions(
+            self,
+            TIMELINE_ACTIONS,
+            {
+                "zoom_in": lambda: self.zoom(ZOOM),
+                "zoom_out": lambda: self.zoom(1 / ZOOM),
+                "next_handle": lambda: self.step_handle(1),
+                "previous_handle": lambda: self.step_handle(-1),
+                "row_above": lambda: self.step_row(-1),
+                "row_below": lambda: self.step_row(1),
+                "stop_earlier": lambda: self.nudge(-1),
+                "stop_later": lambda: self.nudge(1),
+                "select_all": self.select_all,
+                "show_all": self.show_all,
+            },
+        )
         calls: tuple[tuple[Event, Callable[[], object]], ...] = (
             ("document", self._changed),
             ("clip", self._new_clip),
@@ -160,14 +175,6 @@ class TimelineView(QWidget):
         """Show `factor` times as many frames; the frame at x (default: the playhead) stays."""
         self.places.zoom(factor, at)
         self.update()
-
-    def zoom_in(self) -> None:
-        """Show fewer frames."""
-        self.zoom(ZOOM)
-
-    def zoom_out(self) -> None:
-        """Show more frames."""
-        self.zoom(1 / ZOOM)
 
     def show_all(self) -> None:
         """Show the whole clip."""
@@ -438,30 +445,6 @@ class TimelineView(QWidget):
         found = self.places.timeline
         if found is not None:
             self.session.select(*(disc.id for disc in found[1]))
-
-    def next_handle(self) -> None:
-        """Select the next handle, row by row."""
-        self.step_handle(1)
-
-    def previous_handle(self) -> None:
-        """Select the handle before."""
-        self.step_handle(-1)
-
-    def row_above(self) -> None:
-        """Select the colour at the playhead in the row above."""
-        self.step_row(-1)
-
-    def row_below(self) -> None:
-        """Select the colour at the playhead in the row below."""
-        self.step_row(1)
-
-    def stop_earlier(self) -> None:
-        """Move the selected stops a frame earlier."""
-        self.nudge(-1)
-
-    def stop_later(self) -> None:
-        """Move the selected stops a frame later."""
-        self.nudge(1)
 
     def step_handle(self, by: int) -> bool:
         """Select the next handle, row by row; return whether there is one."""

@@ -1,5 +1,6 @@
 """Dialogs of the long work: options, the command line that does the same, progress, and a stop."""
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -39,7 +40,7 @@ class Field:
     flag : str
         The option; "" is the verb's own argument.
     text : str
-        Its label.
+        Its label, if `texts.FIELDS` has none.
     kind : str
         How it is entered; "words" repeats the option for each word.
     value : str
@@ -53,12 +54,17 @@ class Field:
     """
 
     flag: str
-    text: str
+    text: str = ""
     kind: FieldKind = "text"
     value: str = ""
     choices: tuple[str, ...] = ()
     hint: str = ""
     names: tuple[str, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """Its label."""
+        return self.text or texts.FIELDS[self.flag.lstrip("-").replace("-", "_")]
 
 
 class VerbDialog(QDialog):
@@ -130,6 +136,9 @@ class VerbDialog(QDialog):
         for widget in (self.bar, self.stage, self.log):
             widget.hide()
             column.addWidget(widget)
+        self.offers: list[QPushButton] = []
+        self._offered = QHBoxLayout()
+        column.addLayout(self._offered)
         buttons = QHBoxLayout()
         buttons.addStretch(1)
         self.stop = QPushButton(texts.CLOSE)
@@ -144,13 +153,13 @@ class VerbDialog(QDialog):
         self._show_command()
 
     def _row(self, field: Field) -> tuple[QLabel, QWidget]:
-        label = QLabel(field.text)
+        label = QLabel(field.label)
         if field.kind == "check":
             check = QCheckBox()
             check.setChecked(field.value == "yes")
             check.toggled.connect(self._show_command)
             self.inputs.append(check)
-            check.setAccessibleName(field.text)
+            check.setAccessibleName(field.label)
             return label, check
         if field.kind == "choice":
             choice = Choice()
@@ -159,12 +168,12 @@ class VerbDialog(QDialog):
             choice.setCurrentIndex(max(0, choice.findData(field.value)))
             choice.currentIndexChanged.connect(self._show_command)
             self.inputs.append(choice)
-            choice.setAccessibleName(field.text)
+            choice.setAccessibleName(field.label)
             return label, choice
         line = QLineEdit(field.value)
         line.setPlaceholderText(field.hint)
         line.textChanged.connect(self._show_command)
-        line.setAccessibleName(field.text)
+        line.setAccessibleName(field.label)
         self.inputs.append(line)
         if field.kind in ("text", "words"):
             return label, line
@@ -180,11 +189,11 @@ class VerbDialog(QDialog):
 
     def _choose(self, line: QLineEdit, field: Field) -> None:
         if field.kind == "folder":
-            found = QFileDialog.getExistingDirectory(self, field.text, line.text())
+            found = QFileDialog.getExistingDirectory(self, field.label, line.text())
         elif field.kind == "save":
-            found = QFileDialog.getSaveFileName(self, field.text, line.text())[0]
+            found = QFileDialog.getSaveFileName(self, field.label, line.text())[0]
         else:
-            found = sequence_of(QFileDialog.getOpenFileName(self, field.text, line.text())[0])
+            found = sequence_of(QFileDialog.getOpenFileName(self, field.label, line.text())[0])
         if found:
             line.setText(found)
 
@@ -220,6 +229,9 @@ class VerbDialog(QDialog):
     def start(self) -> None:
         """Run the verb."""
         self.log.clear()
+        for button in self.offers:
+            button.deleteLater()
+        self.offers.clear()
         self.bar.setRange(0, 0)
         for widget in (self.bar, self.stage, self.log):
             widget.show()
@@ -248,6 +260,8 @@ class VerbDialog(QDialog):
             else:
                 self.stage.setText(texts.DONE if job.status == 0 else texts.FAILED)
             self.go.setEnabled(True)
+            if job.status != 0 and not job.cancelled:
+                self._offer(job.advised)
             self.stop.setText(texts.CLOSE)
             for entry in self.inputs:
                 entry.setEnabled(True)
@@ -256,6 +270,18 @@ class VerbDialog(QDialog):
         self.job = None
         if job.status == 0 and self._done is not None:
             self._done(self)
+
+    def _offer(self, advised: Sequence[str]) -> None:
+        """Show a button for each option that the messages advise, if it has a field here."""
+        for option in dict.fromkeys(advised):
+            flag, _, value = option.partition(" ")
+            for field, entry in zip(self.fields, self.inputs, strict=True):
+                if flag == field.flag or option in field.choices:
+                    button = QPushButton(field.label)
+                    button.setAutoDefault(False)
+                    button.clicked.connect(functools.partial(_take, entry, value or option))
+                    self._offered.addWidget(button)
+                    self.offers.append(button)
 
     def _stop_or_close(self) -> None:
         if self.job is None:
@@ -270,3 +296,14 @@ class VerbDialog(QDialog):
             self._stop_or_close()
         else:
             super().reject()
+
+
+def _take(entry: QLineEdit | QComboBox | QCheckBox, value: str) -> None:
+    """Go to an entry, and enter the advised value if there is one."""
+    entry.setFocus()
+    if isinstance(entry, QCheckBox):
+        entry.setChecked(True)
+    elif isinstance(entry, QComboBox):
+        entry.setCurrentIndex(max(0, entry.findData(value)))
+    elif not value.startswith("--"):
+        entry.setText(value)

@@ -67,7 +67,7 @@ class VerbMenu:
             [
                 Field("", texts.SHOW, "open", path),
                 Field("-o", texts.FOLDER, "folder", str(Path(path).with_suffix("")) + "_shots"),
-                Field("--media", texts.MEDIA, "folder", hint=texts.MEDIA_HINT),
+                Field("--media", kind="folder", hint=texts.MEDIA_HINT),
                 *self._search_fields(),
             ],
             self._open_result,
@@ -86,11 +86,11 @@ class VerbMenu:
             [
                 Field("", texts.CLIP, "open", clip, hint=texts.CLIP_HINT),
                 Field("-o", texts.SIDECAR, "save", out),
-                Field("--frames", texts.FRAMES, hint=texts.FRAMES_HINT),
-                Field("--like", texts.LIKE, "open", hint=texts.LIKE_HINT),
+                Field("--frames", hint=texts.FRAMES_HINT),
+                Field("--like", kind="open", hint=texts.LIKE_HINT),
                 *self._search_fields(),
                 Field("", texts.EDITS, "choice", edits, EDITS, names=texts.EDITS_NAMES),
-                Field("--detect-shots", texts.DETECT_SHOTS, "check"),
+                Field("--detect-shots", kind="check"),
             ],
             self._open_result,
         )
@@ -103,14 +103,14 @@ class VerbMenu:
     def _search_fields() -> list[Field]:
         """Return the options that a clip and an edit have in common."""
         return [
-            Field("--vertices", texts.VERTICES, hint=texts.VERTICES_HINT),
-            Field("--input-space", texts.INPUT_SPACE, hint=texts.SPACE_HINT),
-            Field("--palette-space", texts.PALETTE_SPACE, hint=texts.SPACE_HINT),
-            Field("--ocio-config", texts.CONFIG, "open", hint="$OCIO"),
-            Field("--method", texts.METHOD, "choice", "", ("", *METHODS), texts.METHOD_HINT),
+            Field("--vertices", hint=texts.VERTICES_HINT),
+            Field("--input-space", hint=texts.SPACE_HINT),
+            Field("--palette-space", hint=texts.SPACE_HINT),
+            Field("--ocio-config", kind="open", hint="$OCIO"),
+            Field("--method", "", "choice", "", ("", *METHODS), texts.METHOD_HINT),
             Field("--set", texts.SETTINGS, "words", hint=texts.SETTINGS_HINT),
-            Field("--skip-bad-frames", texts.SKIP_BAD, "check"),
-            Field("--allow-cuts", texts.ALLOW_CUTS, "check"),
+            Field("--skip-bad-frames", kind="check"),
+            Field("--allow-cuts", kind="check"),
         ]
 
     @staticmethod
@@ -147,7 +147,7 @@ class VerbMenu:
                 Field("", texts.SIDECAR, "open", str(path)),
                 Field("", texts.CLIP, "open", self._clip_source),
                 Field("-o", texts.OUTPUT, "save", str(path.with_name(f"{stem}_graded.mp4"))),
-                Field("--frames", texts.FRAMES, value="{}-{}".format(*marks) if marks else ""),
+                Field("--frames", value="{}-{}".format(*marks) if marks else ""),
                 Field(
                     "--compare",
                     texts.COMPARE_LABEL,
@@ -157,8 +157,8 @@ class VerbMenu:
                     texts.NO_COMPARE,
                 ),
                 Field("--bits", texts.BITS, "choice", "", ("", "8", "16", "32"), texts.BITS_HINT),
-                Field("--half", texts.HALF, "check"),
-                Field("--force", texts.FORCE, "check"),
+                Field("--half", kind="check"),
+                Field("--force", kind="check"),
             ],
         )
 
@@ -174,8 +174,8 @@ class VerbMenu:
                 Field("", texts.SIDECAR, "open", str(path)),
                 Field("--frame", texts.FRAME_FIELD, value=str(frame)),
                 Field("-o", texts.OUTPUT, "save", beside(path, f"_{frame}.cube")),
-                Field("--size", texts.GRID, hint="33"),
-                Field("--force", texts.FORCE, "check"),
+                Field("--size", hint="33"),
+                Field("--force", kind="check"),
             ],
         )
 
@@ -188,10 +188,10 @@ class VerbMenu:
             "export",
             [
                 Field("", texts.SIDECAR, "open", str(path)),
-                Field("--every", texts.EVERY, value="1"),
+                Field("--every", value="1"),
                 Field("-o", texts.FOLDER, "folder", beside(path, "_luts")),
                 Field("--format", texts.FORMAT, hint="cube"),
-                Field("--force", texts.FORCE, "check"),
+                Field("--force", kind="check"),
             ],
         )
 
@@ -205,8 +205,8 @@ class VerbMenu:
             [
                 Field("", texts.SIDECAR, "open", str(path)),
                 Field("-o", texts.FOLDER, "folder", beside(path, "_config")),
-                Field("--base", texts.BASE_CONFIG, "open"),
-                Field("--force", texts.FORCE, "check"),
+                Field("--base", kind="open"),
+                Field("--force", kind="check"),
             ],
         )
 
@@ -220,7 +220,7 @@ class VerbMenu:
                 Field("--link", texts.LINK, "check"),
                 Field("--kdenlive", "Kdenlive", "check"),
                 Field("--shotcut", "Shotcut", "check"),
-                Field("--force", texts.FORCE, "check"),
+                Field("--force", kind="check"),
             ],
         )
 

@@ -356,11 +356,10 @@ class Window(QMainWindow):
         return made
 
     def action(self, name: str) -> Callable[[], object]:
-        """Return what does an action: a method of its name."""
+        """Return what does an action: a call of the menus, or a method of its name."""
         owners: tuple[object, ...] = (self.files, self.commands, self.verbs, self.help)
-        owner = next(each for each in owners if hasattr(each, name))
-        found: Callable[[], object] = getattr(owner, name)
-        return found
+        methods = (getattr(each, name) for each in owners if hasattr(each, name))
+        return self.commands.calls.get(name) or next(methods)
 
     def _do(self, name: str, *_: object) -> None:
         """Do an action; whatever goes wrong becomes the status."""
