@@ -78,8 +78,13 @@ std::string unpasted(std::string path) {
     }
     constexpr const char* kUrl = "file://";
     if (path.rfind(kUrl, 0) != 0) return path;
+    std::size_t start = std::strlen(kUrl);
+    constexpr const char* kHere = "localhost/";
+    if (path.compare(start, std::strlen(kHere), kHere) == 0) start += std::strlen(kHere) - 1;
+    const bool drive = start + 1 < path.size() && path[start + 1] == ':';
+    if (start < path.size() && path[start] != '/' && !drive) return path;  // another computer's
     std::string plain;
-    for (std::size_t at = std::strlen(kUrl); at < path.size(); ++at) {
+    for (std::size_t at = start; at < path.size(); ++at) {
         const auto hex = [&](std::size_t i) {
             return i < path.size() && std::isxdigit(static_cast<unsigned char>(path[i])) != 0;
         };

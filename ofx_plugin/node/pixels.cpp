@@ -123,15 +123,34 @@ bool is_empty(const OfxRectI& rect) { return rect.x1 >= rect.x2 || rect.y1 >= re
 
 namespace {
 
-/// Visits each value of an area's rows; the image's values have type `Number`.
+/// Calls each(place) for the values of an area's rows. Hosts may put rows at any byte, so that a
+/// place may not be read as a number.
 template <class Number, class Each>
-void each_number(const Image& image, const OfxRectI& area, Each each) {
+void each_place(const Image& image, const OfxRectI& area, Each each) {
     const std::size_t row =
         static_cast<std::size_t>(area.x2 - area.x1) * static_cast<std::size_t>(image.channels);
     for (int y = area.y1; y < area.y2; ++y) {
-        auto* numbers = reinterpret_cast<Number*>(image.at(area.x1, y));
-        for (std::size_t i = 0; i < row; ++i) each(numbers[i]);
+        auto* place = reinterpret_cast<unsigned char*>(image.at(area.x1, y));
+        for (std::size_t i = 0; i < row; ++i, place += sizeof(Number)) each(place);
     }
+}
+
+/// Sets `to` to what `convert` makes of each of an area's values, of type `Number`.
+template <class Number, class Convert>
+void read_numbers(const Image& image, const OfxRectI& area, float* to, Convert convert) {
+    each_place<Number>(image, area, [&](const unsigned char* place) {
+        Number number;
+        std::memcpy(&number, place, sizeof number);
+        *to++ = convert(number);
+    });
+}
+
+template <class Number, class Convert>
+void write_numbers(const float* from, const Image& image, const OfxRectI& area, Convert convert) {
+    each_place<Number>(image, area, [&](unsigned char* place) {
+        const Number number = convert(*from++);
+        std::memcpy(place, &number, sizeof number);
+    });
 }
 
 }  // namespace
@@ -139,39 +158,28 @@ void each_number(const Image& image, const OfxRectI& area, Each each) {
 void read_floats(const Image& image, const OfxRectI& area, float* to) {
     switch (image.depth) {
         case Depth::kByte:
-            each_number<std::uint8_t>(
-                image, area, [&](std::uint8_t n) { *to++ = static_cast<float>(n) / 255.0f; });
-            break;
+            return read_numbers<std::uint8_t>(
+                image, area, to, [](std::uint8_t n) { return static_cast<float>(n) / 255.0f; });
         case Depth::kShort:
-            each_number<std::uint16_t>(
-                image, area, [&](std::uint16_t n) { *to++ = static_cast<float>(n) / 65535.0f; });
-            break;
+            return read_numbers<std::uint16_t>(
+                image, area, to, [](std::uint16_t n) { return static_cast<float>(n) / 65535.0f; });
         case Depth::kHalf:
-            each_number<std::uint16_t>(image, area, [&](std::uint16_t n) { *to++ = from_half(n); });
-            break;
+            return read_numbers<std::uint16_t>(image, area, to, from_half);
         case Depth::kFloat:
-            each_number<float>(image, area, [&](float n) { *to++ = n; });
-            break;
+            return read_numbers<float>(image, area, to, [](float n) { return n; });
     }
 }
 
 void write_floats(const float* from, const Image& image, const OfxRectI& area) {
     switch (image.depth) {
         case Depth::kByte:
-            each_number<std::uint8_t>(
-                image, area, [&](std::uint8_t& n) { n = to_integer<std::uint8_t>(*from++); });
-            break;
+            return write_numbers<std::uint8_t>(from, image, area, to_integer<std::uint8_t>);
         case Depth::kShort:
-            each_number<std::uint16_t>(
-                image, area, [&](std::uint16_t& n) { n = to_integer<std::uint16_t>(*from++); });
-            break;
+            return write_numbers<std::uint16_t>(from, image, area, to_integer<std::uint16_t>);
         case Depth::kHalf:
-            each_number<std::uint16_t>(image, area,
-                                       [&](std::uint16_t& n) { n = to_half(*from++); });
-            break;
+            return write_numbers<std::uint16_t>(from, image, area, to_half);
         case Depth::kFloat:
-            each_number<float>(image, area, [&](float& n) { n = *from++; });
-            break;
+            return write_numbers<float>(from, image, area, [](float n) { return n; });
     }
 }
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -394,3 +396,19 @@ def test_versions_are_drawn_and_compared(
     for words in ([], ["--version", "red"]):
         assert main(["bake", str(path), "--frame", "0", "-o", str(cube), "--force", *words]) == 0
         assert ("nothing is edited" in capsys.readouterr().out) == (not words)
+
+
+def test_settings_of_the_working_folder_are_not_read(tmp_path: Path) -> None:
+    """A clip's folder may be a stranger's."""
+    (tmp_path / "matplotlibrc").write_text("no.such.setting: 1\nbackend: module://stranger\n")
+    words = ["plot", str(GOLDEN / "v1_tetrahedron.p4d.json"), "-o", "plot.svg"]
+    run = subprocess.run(
+        [sys.executable, "-P", "-m", "palette4d", *words],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "matplotlibrc" not in run.stderr
+    assert "stranger" not in run.stderr
+    assert (tmp_path / "plot.svg").is_file()

@@ -95,6 +95,8 @@ TEST(files_are_found_where_they_are_and_where_they_went) {
     }
     CHECK(find_file("\"sub/b.p4d.json\"", "'" + clip + "'\n") == deep);
     CHECK(find_file("file://" + clip + "/c%20d%2520.p4d.json", "") == spaced);
+    CHECK(find_file("file://localhost" + clip + "/c%20d%2520.p4d.json", "") == spaced);
+    CHECK(!find_file("file://server" + clip + "/c%20d%2520.p4d.json", ""));
     CHECK(find_file(spaced, "") == spaced);  // no URL
     CHECK(!find_file("'", "") && !find_file("file://", "") && !find_file(" \n", clip));
     CHECK(find_file("a.p4d.json", in_folder("clip")) == beside);

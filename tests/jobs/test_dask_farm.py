@@ -75,7 +75,7 @@ def test_an_open_address_is_warned_of(
     for address, warned in (
         ("tcp://gone.invalid:8786", True),
         ("ws://gone.invalid:8786", True),
-        ("tcp://127.0.0.1:9", False),
+        ("tcp://127.0.0.1:9", True),
     ):
         with pytest.raises(Palette4dError):
             farms.run(address, piece, {0: 1}, lambda key, found: None)

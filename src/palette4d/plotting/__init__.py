@@ -6,7 +6,9 @@ timeline, `solid` the polyhedron's projection. The window draws these, too. `tim
 matplotlib is imported inside functions only, and its global state is never changed.
 """
 
+import contextlib
 import importlib
+import logging
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -59,7 +61,7 @@ def plot(
     Palette4dError
         The sidecar, a frame, the clip or the output is unusable; nothing was written.
     """
-    _import_quietly()
+    _load_matplotlib()
     import matplotlib.style
 
     from palette4d.common.errors import Palette4dError
@@ -111,14 +113,17 @@ def plot(
     return [column.frame for column in columns if not column.pictures]
 
 
-def _import_quietly() -> None:
-    """Import matplotlib, which without a home folder would warn of where its cache is."""
-    import logging
+def _load_matplotlib() -> None:
+    """Import matplotlib without its warnings, such as of where its cache is without a home folder.
 
+    It would read a matplotlibrc of the folder that it is imported in.
+    """
     logger = logging.getLogger("matplotlib")
     before = logger.level
     logger.setLevel(logging.ERROR)
+    away = contextlib.chdir(Path(__file__).parent)
     try:
-        importlib.import_module("matplotlib.font_manager")
+        with contextlib.suppress(FileNotFoundError), away:  # the folder may be gone
+            importlib.import_module("matplotlib.font_manager")
     finally:
         logger.setLevel(before)

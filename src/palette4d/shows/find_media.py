@@ -34,6 +34,11 @@ def local_path(url: str) -> Path:
     if parts.scheme == "":
         return Path(url)
     if parts.scheme == "file":
+        if parts.netloc not in ("", "localhost"):
+            raise Palette4dError(
+                f"found the media {url!r} of the computer {parts.netloc!r}, expected a file of "
+                "this one; relink it, or name its folder with media=…"
+            )
         return Path(urllib.request.url2pathname(parts.path))
     raise Palette4dError(
         f"found the media {url!r}, expected a file; relink it, or name its folder with "
