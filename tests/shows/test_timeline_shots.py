@@ -324,6 +324,7 @@ class TestMedia:
             "S:/show/b/take.mov",
             "\\\\server\\show\\b\\take.mov",
             "file:///S:/show/b/take.mov",
+            "file://localhost/show/b/take.mov",
             "file://server/show/b/take.mov",
         ],
     )
@@ -332,6 +333,20 @@ class TestMedia:
     ) -> None:
         (shot,) = edit(timeline(clip("a", external(url), 0, 5)), tmp_path, plates).shots
         assert shot.clip == str(plates / "b" / "take.mov")
+
+    def test_a_path_of_another_computer_is_none_of_this_one(
+        self, tmp_path: Path, plates: Path
+    ) -> None:
+        here = (plates / "b" / "take.mov").as_posix()
+        one, other = edit(
+            timeline(
+                clip("a", external(f"file://localhost{here}"), 0, 5),
+                clip("b", external(f"file://server{here}"), 0, 5),
+            ),
+            tmp_path,
+        ).shots
+        assert one.clip == here
+        assert "another computer" in other.problem
 
     def test_no_such_folder(self, tmp_path: Path) -> None:
         with pytest.raises(Palette4dError, match="no such folder"):

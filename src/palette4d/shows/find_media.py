@@ -34,16 +34,17 @@ def local_path(url: str) -> Path:
     if parts.scheme == "":
         return Path(url)
     if parts.scheme == "file":
-        if parts.netloc not in ("", "localhost"):
-            raise Palette4dError(
-                f"found the media {url!r} of the computer {parts.netloc!r}, expected a file of "
-                "this one; relink it, or name its folder with media=…"
-            )
         return Path(urllib.request.url2pathname(parts.path))
     raise Palette4dError(
         f"found the media {url!r}, expected a file; relink it, or name its folder with "
         f"{Arg('media')}"
     )
+
+
+def is_elsewhere(url: str) -> bool:
+    """Return whether a file:// URL names another computer, whose path is none of this one."""
+    parts = urllib.parse.urlsplit(url)
+    return parts.scheme == "file" and parts.netloc not in ("", "localhost")
 
 
 class Folder:

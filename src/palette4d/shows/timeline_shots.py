@@ -131,6 +131,11 @@ class _Finder:
         names += [name for name in (clip.name, clip.reel) if name]
         if named and self.folder is not None and (there := self.folder.find([named])):
             return str(there)
+        if find_media.is_elsewhere(clip.url or ""):
+            raise Palette4dError(
+                f"found the media {clip.url!r} of another computer, expected a file of this one; "
+                "relink it, or name the folder that holds it with media=…"
+            )
         if named and (spec := find_media.as_clip(self.path.parent / named)) is not None:
             return spec
         if self.folder is not None and (there := self.folder.find(names)):
