@@ -72,6 +72,8 @@ class TestSpeed:
             ("01:00:08:00", "-048.0", "01:00:08:00", (0, 190, -2)),
             ("01:00:04:10", "026.4", "01:00:00:00", (0, 104, 1.1)),
             ("01:00:00:01", "000.0", "01:00:00:00", (0, 0, 0)),
+            ("01:00:13:03", "-079.0", "01:00:00:00", (0, 312, -3.29)),
+            ("01:00:13:01", "079.0", "01:00:00:00", (0, 312, 3.29)),
         ],
     )
     def test_as_cmx_defines_it(
@@ -94,6 +96,20 @@ class TestSpeed:
     def test_ntsc(self, tmp_path: Path, m2: str) -> None:
         text = event(FOUR, FOUR, f"M2   AX   {m2}   01:00:00:00")
         assert shown(text, tmp_path, Fraction(24000, 1001))[:2] == (0, 190)
+
+    @pytest.mark.parametrize(
+        "m2",
+        [
+            "M2   Z682_156       048.0                01:00:00:00",
+            "M2   Z682 156       048.0                01:00:00:00",
+            "M2\t2\t48\t\t01:00:00:00",
+            "M2   048.0  01:00:00:00",
+            "M2   AX  048.0",
+            "M2   AX  048.0  MSTR  I  +00:00:00:15",
+        ],
+    )
+    def test_reels_with_numbers_and_lines_without_a_timecode(self, tmp_path: Path, m2: str) -> None:
+        assert shown(event(FOUR, FOUR, m2), tmp_path) == (0, 190, 2)
 
     @pytest.mark.parametrize("words", ["* FREEZE FRAME", "* * FREEZE FRAME"])
     def test_freeze_frame_comments(self, tmp_path: Path, words: str) -> None:

@@ -185,7 +185,9 @@ class Motion:
     problem: str = ""
 
 
-_M2 = re.compile(r"M2\s+(.*?)\s*([+-]?[0-9]+(?:\.[0-9]*)?)(?:\s+([0-9:;.,]+|\S.*))?")
+#: The time effect of an event whose frames are not known; the effect's name is the reason.
+UNFOLLOWED = "palette4d.unfollowed"
+_M2 = re.compile(r"M2\s+(?:(\S.*)\s+)?([+-]?[0-9]+(?:\.[0-9]*)?)(?:\s+(\S.*))?")
 #: Frames per second by which M2 may be off: it has one decimal.
 ROUNDED = 0.0501
 _FREEZE = re.compile(r"\*\s*(\*\s*)?FREEZE FRAME")
@@ -193,7 +195,7 @@ _FREEZE = re.compile(r"\*\s*(\*\s*)?FREEZE FRAME")
 
 def is_motion(comment: str) -> bool:
     """Whether a comment states how fast an event plays."""
-    return comment.startswith("M2 ") or _FREEZE.match(comment) is not None
+    return bool(re.match(r"M2\s", comment) or _FREEZE.match(comment))
 
 
 def motion_of(event: Event, rate: Fraction) -> Motion:
@@ -235,8 +237,9 @@ def motion_of(event: Event, rate: Fraction) -> Motion:
 
 def _of_lengths(media: int, frames: int, speed: float, rate: Fraction) -> float | None:
     """Return the speed that fits the lengths of source and record; None if none does."""
-    length = abs(media)
-    if abs(length - frames * abs(speed)) <= 1:
+    length, fast = abs(media), abs(speed)
+    # Avid's source ends with the last frame that plays, others' with the last frame's end.
+    if fast * (frames - 1) - 1 <= length <= fast * frames + 1:
         return speed
     exact = math.copysign(length / frames, speed)
     if abs(exact - speed) * rate <= 2 * ROUNDED:
@@ -262,9 +265,9 @@ def _speeds(event: Event, rate: Fraction) -> list[tuple[float, int | None]]:
     """Return (speed, first frame) of each line M2 that belongs to the event's own clip."""
     found = []
     for comment in event.comments:
-        if comment.startswith("M2 ") and (match := _M2.fullmatch(comment)):
+        if match := _M2.fullmatch(comment):
             at = frames_of(match[3] or "", rate)
-            found.append(("_".join(match[1].split()), _speed(float(match[2]), rate), at))
+            found.append(("_".join((match[1] or "").split()), _speed(float(match[2]), rate), at))
     if len(event.lines) == 2 and len(found) > 1:
         before, own = event.lines
         # Of two clips in a transition, the one before may state its speed again.

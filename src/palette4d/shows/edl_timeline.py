@@ -14,7 +14,7 @@ from typing import Any
 from palette4d.common.errors import Arg, Palette4dError
 from palette4d.media.clip_base import DEFAULT_RATE
 from palette4d.shows import edl_cdl, edl_text
-from palette4d.shows.edl_text import Event, Motion
+from palette4d.shows.edl_text import UNFOLLOWED, Event, Motion
 
 #: Begins a comment of ours: the adapter keeps comments with their clip.
 _MARK = "PALETTE4D EVENT"
@@ -114,7 +114,7 @@ def _finish(clip: Any, events: list[Event], motions: list[Motion], otio: Any) ->
         clip.name = events[index].own.number
     motion, schema = motions[index], otio.schema
     if motion.problem:
-        clip.effects.append(schema.TimeEffect(name=motion.problem, effect_name="M2"))
+        clip.effects.append(schema.TimeEffect(name=motion.problem, effect_name=UNFOLLOWED))
     elif motion.speed == 0:
         clip.name = clip.name.removesuffix(" FF")
         clip.effects.append(schema.FreezeFrame())

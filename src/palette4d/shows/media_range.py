@@ -17,6 +17,7 @@ from typing import Any
 from palette4d.common.errors import Palette4dError
 from palette4d.media.clip_base import as_rate
 from palette4d.media.timecode import nominal
+from palette4d.shows.edl_text import UNFOLLOWED
 from palette4d.shows.timeline_files import library
 
 #: Part of a frame within which two times are the same: files hold times as rounded decimals.
@@ -161,10 +162,12 @@ def speed_of(clip: Any) -> float:
     for effect in clip.effects:
         if isinstance(effect, schema.LinearTimeWarp):  # a freeze frame, too
             speed *= effect.time_scalar
+        elif isinstance(effect, schema.TimeEffect) and effect.effect_name == UNFOLLOWED:
+            raise Palette4dError(f"the clip {clip.name!r}: {effect.name}")
         elif isinstance(effect, schema.TimeEffect):
             raise Palette4dError(
                 f"the clip {clip.name!r} has the time effect {effect.effect_name!r}, which is "
-                f"not followed; {effect.name or 'expected a constant speed or a freeze frame'}"
+                "not followed; expected a constant speed or a freeze frame"
             )
     if not math.isfinite(speed):
         raise Palette4dError(
