@@ -348,3 +348,22 @@ def test_a_matrix_that_cannot_be_read_is_refused(tmp_path):
     source = movie(tmp_path / "s.mp4", list(tiles()), tags=(9, 16, 14))
     with pytest.raises(ClipError, match="ICtCp"):
         open_clip(str(source))
+
+
+def test_hdr10_is_kept_by_hevc(tmp_path):
+    display = "G(13250,34500)B(7500,3000)R(34000,16000)WP(15635,16450)L(10000000,50)"
+    params = f"log-level=error:master-display={display}:max-cll=1000,400"
+    source = movie(
+        tmp_path / "s.mp4",
+        list(tiles(4)),
+        "libx265",
+        "yuv420p10le",
+        tags=(9, 16, 9),
+        options={"x265-params": params},
+    )
+    expected = f"master-display={display}:max-cll=1000,400"
+    assert open_clip(str(source)).stated.hdr10 == expected
+    render(source, tmp_path / "o.mp4")
+    assert open_clip(str(tmp_path / "o.mp4")).stated.hdr10 == expected
+    done = render(source, tmp_path / "o.mov")
+    assert any("HDR10" in note for note in done.notes)

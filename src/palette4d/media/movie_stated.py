@@ -7,8 +7,10 @@ from fractions import Fraction
 from typing import Any
 
 import av
+import numpy as np
 from av.error import FFmpegError
 from av.filter import Graph
+from av.sidedata.sidedata import Type
 
 from palette4d.media.colour_tags import ColourTags
 from palette4d.media.movie_pixels import FULL_RANGE, is_luma_chroma, turn
@@ -42,7 +44,27 @@ def stated_by(container: Any, stream: Any, picture: av.VideoFrame) -> Stated:
         field_order=order if fields else 0,
         reel=_first(container, "reel_name"),
         timecode=timecode_of(container),
+        hdr10=_hdr10(picture),
     )
+
+
+def _hdr10(picture: av.VideoFrame) -> str:
+    """Return the static metadata of HDR10 (SMPTE ST 2086, CTA-861.3) as x265 takes them."""
+    every: Any = picture.side_data
+    found = {one.type: bytes(one) for one in every}
+    texts = []
+    if (display := found.get(Type.MASTERING_DISPLAY_METADATA)) is not None:
+        # Ten fractions: x and y of red, green, blue and white, least and largest luminance.
+        pairs = np.frombuffer(display[:80], "=i4").reshape(10, 2).astype(float)
+        numbers = np.divide(pairs[:, 0], pairs[:, 1], where=pairs[:, 1] != 0, out=np.zeros(10))
+        r, g, b, white = (
+            "({:.0f},{:.0f})".format(*pair) for pair in numbers[:8].reshape(4, 2) * 50_000
+        )
+        low, high = numbers[8:] * 10_000
+        texts.append(f"master-display=G{g}B{b}R{r}WP{white}L({high:.0f},{low:.0f})")
+    if (light := found.get(Type.CONTENT_LIGHT_LEVEL)) is not None:
+        texts.append("max-cll={},{}".format(*np.frombuffer(light[:8], "=u4").tolist()))
+    return ":".join(texts)
 
 
 def timecode_of(container: Any) -> str:

@@ -95,6 +95,11 @@ class Delivery:
                     f"{chosen.name} states primaries and transfer together or not at all: the "
                     "clip states one, the movie none"
                 )
+        if stated.hdr10 and "x265-params" not in chosen.options:
+            notes.append(
+                f"the mastering display and the light levels of HDR10 are not kept: {chosen.name} "
+                "does not hold them; codec=hevc does"
+            )
         if alpha and not chosen.alpha_layout:
             notes.append(
                 "the movie has no alpha, the picture is laid over black; frames and "
@@ -200,6 +205,8 @@ def _stream(movie: Any, size: tuple[int, int], rate: Fraction, how: Delivery) ->
         options["crf"] = str(how.crf)
     if stated.fields:
         options["flags"] = "+ildct+ilme"
+    if stated.hdr10 and "x265-params" in options:
+        options["x265-params"] += f":{stated.hdr10}"
     stream = movie.add_stream(how.codec.encoder, rate=rate, options=options)
     stream.width, stream.height = how.size(*size)
     stream.pix_fmt = how.codec.alpha_layout if how.alpha else how.codec.layout

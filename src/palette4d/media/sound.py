@@ -42,7 +42,7 @@ class Sound:
         with opened_movie(clip.path) as movie:
             video = movie.streams.best("video")
             for one in movie.streams:
-                if one.index == video.index or one.codec_context is None:
+                if one.index == video.index or "timecode" in one.metadata:
                     continue  # timecode is written anew
                 if one.type == "audio" and _fits(one, extension):
                     streams.append(one.index)

@@ -24,6 +24,7 @@ class Stated:
     field_order : FFmpeg's number for the order in which the file stores and shows fields.
     reel : name of the reel or the camera's roll, or "".
     timecode : `HH:MM:SS:FF` of frame 0 of a movie, or "".
+    hdr10 : mastering display and light levels, as the options of x265; "" if there are none.
     """
 
     tags: ColourTags = field(default_factory=ColourTags)
@@ -33,3 +34,4 @@ class Stated:
     field_order: int = 0
     reel: str = ""
     timecode: str = ""
+    hdr10: str = ""
