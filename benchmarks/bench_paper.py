@@ -15,14 +15,15 @@ from __future__ import annotations
 import argparse
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import chang
 import evaluator
 import numpy as np
-from evaluator import PAPER_RULES, Figures, Runs, TimedPalette, say, table
-from palette4d.analysis.options import METHODS
+from evaluator import PAPER_RULES, Cut, Figures, Runs, TimedPalette, say, table
+from palette4d.analysis.losses import NO_FACES
 
 from palette4d import _core
 from palette4d.media.clip import open_clip
@@ -101,15 +102,13 @@ def figure_8_options() -> dict[str, tuple[str, ...]]:
 
 
 def comparison_options() -> dict[str, tuple[str, ...]]:
-    """Return the methods of section 6.2 by name; those that this version has."""
-    out: dict[str, tuple[str, ...]] = {
+    """Return the analyses of section 6.2 by method."""
+    return {
         "skew": (),
         "paper": (*PAPER_RULES, "--set", "eta2=3.0"),
         "static": ("--method", "static"),
+        "rgbt": ("--method", "rgbt"),
     }
-    if "rgbt" in METHODS:
-        out["rgbt"] = ("--method", "rgbt")
-    return out
 
 
 METHOD_NAMES = {
@@ -117,6 +116,7 @@ METHOD_NAMES = {
     "paper": "skew polytope, the paper's rules",
     "static": "static RGB hull, refined",
     "rgbt": "convex hull in RGB and time",
+    "chang": "k-means palette, Chang et al. 2015",
 }
 
 
@@ -152,7 +152,7 @@ def comparison(
     if is_seasons:
         header.append("the paper's C")
     rows = []
-    for name in comparison_options():
+    for name in METHOD_NAMES:
         x = figures[name]
         row: list[Any] = [METHOD_NAMES[name], x.vertices, f"{x.colours:.1f}"]
         row += [*evaluator.fit_cells(x), evaluator.outside_cell(x), f"{x.farthest:.3f}"]
@@ -183,6 +183,23 @@ def pooled_compactness(
         gaps = colours - tree.nearest_mean(colours, evaluator.K_PIXELS)
         out[name] = float(np.linalg.norm(gaps, axis=1).mean())
     return out
+
+
+def clusters(clip: str, frames: str | None) -> TimedPalette:
+    """Return the k-means palette of all frames, with vertices at both ends of the clip."""
+    numbers = []
+
+    def colours() -> Iterator[tuple[evaluator.F64, evaluator.F64]]:
+        for number, image in open_clip(clip, frames=frames).iter_colours():
+            numbers.append(number)
+            yield evaluator.distinct_colours(image)[:2]
+
+    rgb = chang.srgb(chang.extract(*chang.binned(colours())))
+    ends, count = (min(numbers), max(numbers)), len(rgb)
+    cut = Cut(rgb, NO_FACES, np.eye(count, dtype=bool))
+    vertices = np.vstack([np.column_stack([rgb, np.full(count, t)]) for t in ends])
+    edges = np.column_stack([np.arange(count), np.arange(count) + count]).astype(np.int32)
+    return TimedPalette(dict.fromkeys(numbers, cut), vertices, edges, [ends])
 
 
 def draw_timelines(sidecars: Sequence[tuple[str, Path]], output: Path, width: int = 860) -> None:
@@ -238,8 +255,9 @@ def main() -> None:
         texts = [table_1(runs, name), table_2(runs, name)]
         chosen = figure_8_options() | comparison_options()
         palettes = {words: runs.palette(*options) for words, options in chosen.items()}
+        palettes["chang"] = clusters(args.clip, args.frames)
         figures = evaluator.measure(args.clip, palettes, args.evaluator, args.frames)
-        methods = {words: palettes[words] for words in comparison_options()}
+        methods = {words: palettes[words] for words in METHOD_NAMES}
         pooled = pooled_compactness(args.clip, args.frames, methods)
         outside = evaluator.outside_header(figures.values())
         texts += [figure_8(figures, outside), comparison(figures, pooled, is_seasons, outside)]
@@ -261,7 +279,7 @@ def main() -> None:
                 {"η₂ 1.5": "with vertex refinement", "η₂ 1.5, not refined": "without"},
                 "figure_9.png",
             )
-            drawn({key: METHOD_NAMES[key] for key in methods}, "methods.png")
+            drawn({key: METHOD_NAMES[key] for key in comparison_options()}, "methods.png")
     print("\n".join(texts))
     say(f"{time.perf_counter() - started:.0f} s in all")
 
