@@ -15,12 +15,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
-from palette4d.analysis.losses import palette_loss, refine_palette
+from palette4d.analysis.losses import EVALUATIONS, palette_loss, refine_palette
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette
 
-# Most evaluations of the loss per frame; few, since the neighbour's refined palette is the start.
-EVALUATIONS = 30
 # Relative tolerance of losses: below it a frame keeps its neighbour's palette without refinement.
 SAME = 1e-3
 

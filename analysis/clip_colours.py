@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
+from palette4d.analysis.losses import LOST_SHARE
 
 F64 = NDArray[np.float64]
 
@@ -20,9 +21,9 @@ F64 = NDArray[np.float64]
 MOST_ENTRIES, MOST_COLOURS = 12, 64
 # Colours of one cell are averaged. Cells per unit of the gamut's longest side.
 CELLS = 32
-# Weight of a candidate colour: its share of the pixels, at least LEAST_SHARE, to the power ROOT.
-# With a low power, a lamp of a few pixels is chosen for its distance.
-LEAST_SHARE, ROOT = 1e-4, 0.25
+# Weight of a candidate colour: its share of the pixels, at least `LOST_SHARE`, to this power. With
+# larger powers, a lamp of a few pixels is not chosen for its distance.
+ROOT = 0.25
 # Decimal places of the JSON: a tenth of an 8-bit step.
 DIGITS = 4
 
@@ -56,7 +57,7 @@ def _reduced(frames: Sequence[FrameStatistics], gamut: Gamut) -> list[list[float
     cells = np.floor((rgb - gamut.low) * (CELLS / gamut.scale)).astype(np.int64)
     keys = cells @ np.array([(CELLS + 1) ** 2, CELLS + 1, 1], np.int64)
     rgb, shares = _grouped(rgb, shares, keys)
-    worth = np.maximum(shares, LEAST_SHARE) ** ROOT
+    worth = np.maximum(shares, LOST_SHARE) ** ROOT
     channels = np.ascontiguousarray(rgb.T)  # much quicker than row by row
 
     def distances(chosen: int) -> F64:

@@ -43,10 +43,8 @@ SHORT, RICHER = 48, 2
 MOST_FRAMES = 3000
 # Least colours and coarse colours per frame, for any number of frames.
 FEWEST_COLOURS, FEWEST_COARSE = 1024, 512
-# Caps on the frames that are read at the same time: bytes, and frames.
-MEMORY, MOST_WORKERS = 400 << 20, 8
-# Most bytes of a binner's table.
-TABLE = 64 << 20
+# Cap on the memory of frames that are read at the same time, in bytes, and of each binner's table.
+MEMORY, TABLE = 400 << 20, 64 << 20
 # Least number of pixels that extend a border outside 0..1, and its cap as a share of the frame.
 FEWEST_OUTSIDE, MOST_OUTSIDE_SHARE = 5, 0.01
 # Least distance of an outlier, as a share of the extent of the clip's other colours. Nearer colours
@@ -105,7 +103,7 @@ def gather_clip(
         finally:
             binner.clear()
 
-    most = min(MOST_WORKERS, MEMORY // (TABLE + 12 * pixels), len(chosen))
+    most = min(MEMORY // (TABLE + 12 * pixels), len(chosen))
     workers = max(1, min(thread_count(options), most))
     # Close the generator to end its threads: the traceback of an error would keep them alive.
     with contextlib.closing(_in_order(clip.fills(chosen), statistics_of, workers)) as results:

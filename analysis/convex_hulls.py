@@ -7,20 +7,19 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis.frame_statistics import FrameStatistics
+from palette4d.analysis.frame_statistics import CODE_STEP, FrameStatistics
 from palette4d.analysis.polytope import FramePalette, SkewPolytope
 from scipy.spatial import ConvexHull, QhullError
 
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 
-# Colours within half an 8-bit step of a plane, a line or a point count as flat.
-THIN = 0.5 / 255
-# A concavity of a hull thinner than two 8-bit steps is invisible.
-FLAT = 2 / 255
-# A slice that lacks more than this share of its convex hull counts as non-convex.
+# Tolerance for flat colours: their distance from a plane, a line or a point.
+THIN = CODE_STEP / 2
+# Threshold of a slice that is not convex: the share of its convex hull that it lacks. Smaller
+# values report folds that no gradient shows.
 CONCAVE = 0.05
-# The shape of a slice is judged only if the frame's colours have at least this extent.
+# Least extent of a frame's colours, in code values of one channel, for judging a slice's shape.
 NARROW = 0.24
 
 
@@ -72,7 +71,7 @@ def hull_volume(rgb: F64) -> float:
         hull = ConvexHull(rgb)
     except QhullError:
         return 0.0
-    flat = hull.volume <= FLAT * hull.area / 2  # the mean thickness of the hull
+    flat = hull.volume <= 2 * CODE_STEP * hull.area / 2  # its mean thickness: two steps
     return 0.0 if flat else float(hull.volume)
 
 

@@ -12,6 +12,9 @@ from palette4d import _core
 
 F64 = NDArray[np.float64]
 
+# One 8-bit step of code values: smaller differences are invisible.
+CODE_STEP = 1 / 255
+
 
 @dataclasses.dataclass(frozen=True)
 class FrameStatistics:

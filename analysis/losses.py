@@ -35,6 +35,9 @@ LOST, LOST_SHARE = 0.25, 1e-4
 # Adam's beta 1 and 2, the decay of the gradient's mean and mean square; the square that avoids a
 # division by zero.
 STEP, WARM_UP, MEAN, SQUARE, TINY = 0.012, 3, 0.65, 0.9, 1e-18
+# Most evaluations of a loss when colours move from a good start (NLopt's `maxeval`); twice as many
+# from a simplified hull. More take longer and hardly lower the loss.
+EVALUATIONS = 30
 NO_FACES: I32 = np.zeros((0, 3), np.int32)
 
 
@@ -120,7 +123,7 @@ def refine_palette(
     palette: FramePalette,
     gamut: Gamut,
     options: AnalysisOptions,
-    most_evaluations: int = 60,
+    most_evaluations: int = 2 * EVALUATIONS,
 ) -> F64:
     """Move the colours of a palette to lower eq. 4 (Wang et al. 2019); return them, (n, 3).
 

@@ -13,14 +13,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis.convex_hulls import hull_volume, mesh_volume
-from palette4d.analysis.polytope import Section, SkewPolytope
+from palette4d.analysis.objective import LEAST_GAP
+from palette4d.analysis.polytope import LEAST_COLOURS, Section, SkewPolytope
 
 I32 = NDArray[np.int32]
 
-# Least number of colours that enclose a volume.
-LEAST_COLOURS = 4
-# Longest edge without a stop, in frames: a stop needs `LEAST_GAP` on either side.
-LONG_EDGE = 2
 # Number of times in a section at which candidate meshes are compared.
 COMPARED = 5
 
@@ -86,12 +83,12 @@ def without_chain(
 
 
 def enriched(polytope: SkewPolytope) -> SkewPolytope:
-    """Return the polytope with a stop in the middle of every edge of more than two frames."""
+    """Return the polytope with a stop in the middle of every edge, except the shortest."""
     for u, v in polytope.edges().tolist():
         start, end = polytope.vertices[[u, v]]
         stop = (start + end) / 2
         inside = any(block.first < stop[3] < block.last for block in polytope.blocks)
-        if end[3] - start[3] > LONG_EDGE and inside:
+        if end[3] - start[3] > 4 * LEAST_GAP and inside:
             polytope = polytope.with_stop((u, v), stop.tolist())
     return polytope
 

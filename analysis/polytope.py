@@ -19,6 +19,9 @@ from numpy.typing import NDArray
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 
+# Least number of colours that enclose a volume.
+LEAST_COLOURS = 4
+
 
 @dataclasses.dataclass(frozen=True)
 class FramePalette:

@@ -17,10 +17,9 @@ from palette4d.analysis.convex_hulls import hull_mesh
 from palette4d.analysis.frame_hulls import refined, simple_hull
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut, pooled
 from palette4d.analysis.losses import NO_FACES, shaped_weights
-from palette4d.analysis.moves import LEAST_COLOURS
 from palette4d.analysis.objective import Priced, frame_losses, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.polytope import FramePalette, Section, SkewPolytope
+from palette4d.analysis.polytope import LEAST_COLOURS, FramePalette, Section, SkewPolytope
 
 F64 = NDArray[np.float64]
 

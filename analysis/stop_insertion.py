@@ -7,7 +7,7 @@ that only a few frames have. Frames with lost pixels (`LOST`) get stops.
 The lost colours of such a frame get a stop on a track, with or without stops before and after that
 keep the rest of the track where it is. In the clip's first and last frame the vertex of the track
 itself takes the colour. A stop stays if it brings most of the lost pixels back. It need not be
-worth its `handle_cost`, which judges the mean. The value of `Objective` may rise by `WORTH`.
+worth its `handle_cost`, which judges the mean: the value of `Objective` may rise.
 Its edges count little in eq. 11, which would otherwise rather lose the colour than let it change
 quickly.
 """
@@ -21,7 +21,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
-from palette4d.analysis.losses import LOST, LOST_SHARE, reach_weights
+from palette4d.analysis.losses import EVALUATIONS, LOST, LOST_SHARE, reach_weights
 from palette4d.analysis.objective import LEAST_GAP, Objective, frame_losses, move
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
@@ -36,12 +36,8 @@ I32 = NDArray[np.int32]
 MOST_ROUNDS = 10
 # Least share of the lost pixels that a stop must bring back.
 REMOVED = 0.5
-# Most that a stop may raise the value of `Objective`.
-WORTH = 0.04
 # Cap on the lost colours of a frame that are clustered, farthest first: the time is quadratic.
 FARTHEST = 1000
-# Most evaluations of the objective for each candidate (NLopt).
-EVALUATIONS = 30
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -76,8 +72,6 @@ def insert_stops(
                 continue
             moved, change = _settled(now, trial, frames, gamut, options)
             price = change + options.handle_cost * len(trial.new)
-            if change > WORTH:
-                continue
             rest = _Misfit.of(moved.polytope, [frames[i] for i in trial.span], gamut, options)
             removed = [
                 misfit.removed(i, rest, index, trial.share) for index, i in enumerate(trial.span)

@@ -31,7 +31,7 @@ from palette4d.analysis import moves
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.handle_use import rare_handles
 from palette4d.analysis.losses import loss_weights, shaped_weights, smoothness, thread_count
-from palette4d.analysis.objective import Priced, frame_losses, loss_of, refine_jointly
+from palette4d.analysis.objective import PARTS, Priced, frame_losses, loss_of, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
 
@@ -54,17 +54,14 @@ DEARER = 4
 ROUNDS = ((0, 0.5), (5, 0.05), (30, 0.02))
 # Most candidates with the same numbers of handles and colours in a round.
 OF_A_KIND = 2
-# Relative tolerance of equal prices: the last refinement changes them by as much.
+# Relative tolerance of equal prices, and least gain that justifies another insertion of stops: the
+# last refinement changes prices by as much.
 ALIKE = 0.005
-# Least relative gain in price that justifies another insertion of stops.
-WORTHWHILE = 0.01
 # Extra cost of a rare handle, whatever `handle_cost` is.
 RARE_COST = USUAL_COST
 # Evenly spaced frames for block merging and the first rounds, and for walks; and the number of
 # frames with the largest losses that are added.
 KEY_FRAMES, EVEN_FRAMES, WORST_FRAMES = 48, 16, 8
-# Evenly spaced frames on which the removal of a whole colour is measured.
-CHAIN_FRAMES = 8
 
 
 def search(
@@ -231,7 +228,7 @@ def up_and_down(
     """Insert stops into a palette, remove single vertices again, and return all palettes.
 
     Stops are inserted in the middle of each edge. This is repeated with the best palette so far,
-    while the relative gain in price is at least `WORTHWHILE`.
+    while the relative gain in price is at least `ALIKE`.
     """
     palettes: list[Priced] = []
     while True:
@@ -240,7 +237,7 @@ def up_and_down(
         steps = remove_singly(first, frames, gamut, options, [*known, *palettes])
         palettes += steps
         before, best = best, min(best, *steps, key=_usual_price)
-        if _usual_price(best) > (1 - WORTHWHILE) * _usual_price(before):
+        if _usual_price(best) > (1 - ALIKE) * _usual_price(before):
             return palettes
 
 
@@ -313,7 +310,7 @@ def _cheapest_chain(
 ) -> tuple[int, ...] | None:
     """Return the chain with the least loss without it, before others are refined, or None."""
     weights = shaped_weights(options, gamut.scale, faces=False)
-    measured = range(0, len(frames), -(-len(frames) // CHAIN_FRAMES))
+    measured = range(0, len(frames), PARTS)
 
     def loss(chain: tuple[int, ...]) -> float:
         rest = moves.without_chain(polytope, chain, any_mesh=True)

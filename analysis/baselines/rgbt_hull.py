@@ -42,7 +42,7 @@ from numpy.typing import NDArray
 from palette4d.analysis.convex_hulls import THIN, hull_mesh, two_sided
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.losses import NO_FACES
-from palette4d.analysis.polytope import Section, SkewPolytope
+from palette4d.analysis.polytope import LEAST_COLOURS, Section, SkewPolytope
 from scipy.spatial import ConvexHull, QhullError
 
 from palette4d import _core
@@ -55,7 +55,7 @@ Cut = tuple[int, ...]
 """A part of the hull that a slice cuts: a vertex (v,), or an edge (u, w), u earlier than w."""
 
 VERTICES = 20
-LEAST_VERTICES = 8
+LEAST_VERTICES = 2 * LEAST_COLOURS
 # The convex hull is recomputed when this share of the vertices is left.
 ROUND = 0.8
 # How far beyond the gamut a new vertex may lie, in units of the gamut, before it is clipped.

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis.convex_hulls import concavity, narrow
-from palette4d.analysis.frame_statistics import FrameStatistics
+from palette4d.analysis.frame_statistics import CODE_STEP, FrameStatistics
 from palette4d.analysis.handle_use import handle_use
 from palette4d.analysis.losses import LOST, NO_FACES
 from palette4d.analysis.options import AnalysisOptions
@@ -20,9 +20,6 @@ from palette4d.analysis.options import AnalysisOptions
 from palette4d import _core
 
 F64 = NDArray[np.float64]
-
-# Tolerance for pixels outside in the report: one 8-bit step.
-VISIBLE = 1 / 255
 
 
 @dataclasses.dataclass(frozen=True)
@@ -144,7 +141,7 @@ def _fit(cut: _core.Slice, frame: FrameStatistics, options: AnalysisOptions) -> 
 
     r, c, _, outside, farthest, _ = measured()
     visible, lost = (
-        measured(slight=limit)[3] if farthest > limit else 0.0 for limit in (VISIBLE, LOST)
+        measured(slight=limit)[3] if farthest > limit else 0.0 for limit in (CODE_STEP, LOST)
     )
     return FrameFit(frame.frame, options.lambda_ * r + c, outside, visible, farthest, lost)
 
