@@ -8,12 +8,15 @@ import pytest
 
 from palette4d.cli.main import main
 from palette4d.cli.progress import frames_bar
-from palette4d.cli.swatches import row
 
 EDITED = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_edited.p4d.json"
 
-#: Overwrites a line, sets the window's title, clears the screen, turns the writing around.
-HOSTILE = "\r\x1b[Aa\u200eb\u061c\x1b]0;owned\x07\x1b[2J\rb\x9b31m\u202ec\u2066d"
+#: Forges a line and a patch of colour, overwrites a line, sets the window's title, clears the
+#: screen, turns the writing around.
+FORGED = "palette4d: error: forged"
+HOSTILE = f"\n{FORGED}\n\x1b[48;2;1;2;3m  \x1b[0m " + (
+    "\r\x1b[Aa\u200eb\u061c\x1b]0;owned\x07\x1b[2J\rb\x9b31m\u202ec\u2066d"
+)
 
 
 @pytest.fixture
@@ -31,13 +34,14 @@ def hostile(tmp_path: Path) -> str:
     "arguments",
     [
         ["info"],
+        ["info", "--handles", "--quality"],
         ["info", "--json"],
         ["slice", "--frame", "3"],
         ["bake", "--frame", "3", "-o", "out.cube"],
         ["bake", "--frame", "99", "-o", "out.cube"],
         ["export", "--frames", "3", "-o", "out"],
         ["edit", "reset", HOSTILE],
-        ["render", "gone.\x1b[2J.exr", "-o", "out.exr"],
+        ["render", f"gone\n{FORGED}.\x1b[2J.exr", "-o", "out.exr"],
     ],
     ids=" ".join,
 )
@@ -53,6 +57,7 @@ def test_what_is_printed_is_printable(
     printed = "".join(capsys.readouterr())
     assert printed
     assert all(c == "\n" or (c.isprintable() and c not in "\u202e\u2066") for c in printed)
+    assert not any(line.startswith(FORGED) for line in printed.splitlines())
 
 
 def test_a_name_in_a_progress_bar_is_printable(
@@ -72,5 +77,4 @@ def test_patches_of_colour_still_reach_the_terminal(
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
     monkeypatch.delenv("NO_COLOR", raising=False)
     assert main(["info", str(EDITED), "--handles"]) == 0
-    assert row([0.1, 0.8, 0.1]) in capsys.readouterr().out
-    assert "\x1b[48;2;26;204;26m" in row([0.1, 0.8, 0.1])
+    assert "\x1b[48;2;26;204;26m  \x1b[0m #1acc1a" in capsys.readouterr().out

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from palette4d.cli.swatches import row, swatch
-from palette4d.common.text import counted, hex_of, percent
+from palette4d.common.text import counted, hex_of, on_lines, percent
 
 if TYPE_CHECKING:
     from palette4d.grade.document import Document
@@ -55,6 +55,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(info, ensure_ascii=True, allow_nan=False))
         return 0
+    info = on_lines(info)
     _print_head(info)
     _print_tracks(info)
     if args.handles:

@@ -7,19 +7,15 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import re
 import sys
 from collections.abc import Iterator
 from typing import Any, TextIO
 
 from palette4d.analysis.options import OPTIONS
-from palette4d.cli import job
+from palette4d.cli import job, swatches
 from palette4d.common.message import Arg, Message
 from palette4d.common.text import printable
 from palette4d.studio import texts
-
-# What the command itself sends to terminals: patches of colour (`swatches`).
-_OWN = re.compile(r"(\x1b\[48;2;[0-9]{1,3};[0-9]{1,3};[0-9]{1,3}m  \x1b\[0m )")
 
 
 class _Printable:
@@ -29,8 +25,10 @@ class _Printable:
         self._wrapped = stream  # tqdm's name for it, by which it knows a stream again
 
     def write(self, text: str) -> int:
-        parts = _OWN.split(text)
+        # What the command itself sends to terminals: patches of colour.
+        parts = swatches.PATCH.split(text)
         parts[::2] = map(printable, parts[::2])
+        parts[1::2] = map(swatches.drawn, parts[1::2])
         self._wrapped.write("".join(parts))
         return len(text)
 
@@ -80,7 +78,8 @@ def tell(args: argparse.Namespace, kind: str, text: str) -> None:
     message = Message(text)
     job.event(**{kind: [_event(part, args.parser) for part in message.parts]})
     if not job.on_stderr():
-        words = message.said(lambda arg: option_of(arg, args.parser))
+        # A name with a line break must not look like a message of its own.
+        words = message.said(lambda arg: option_of(arg, args.parser)).replace("\n", "\n  ")
         print(
             f"palette4d: {kind}: {words.encode('utf-8', 'backslashreplace').decode()}",
             file=sys.stderr,

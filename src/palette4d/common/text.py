@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from typing import Any
 
 from palette4d.common.errors import Palette4dError
 
@@ -43,6 +44,17 @@ def printable(text: str) -> str:
     red \\u001b[31m
     """
     return _ACTIVE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+def on_lines(value: Any) -> Any:
+    """Return JSON data whose texts, also the names of members, have no line breaks."""
+    if isinstance(value, str):
+        return value.replace("\n", "\\n")
+    if isinstance(value, list):
+        return [on_lines(item) for item in value]
+    if isinstance(value, dict):
+        return {on_lines(name): on_lines(item) for name, item in value.items()}
+    return value
 
 
 def file_safe(name: str) -> str:
