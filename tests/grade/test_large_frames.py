@@ -70,6 +70,34 @@ def test_strips_give_the_same_pixels(
         assert whole.read(frame).tobytes() == strips.read(frame).tobytes()
 
 
+@pytest.mark.parametrize(
+    ("out", "more"),
+    [
+        ("mov", {}),
+        ("mp4", {}),
+        ("mov", {"codec": "prores4444"}),
+        ("mov", {"codec": "dnxhr-444"}),
+    ],
+    ids=str,
+)
+def test_strips_give_the_same_movie(
+    out: str, more: dict, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from palette4d.media.clip import open_clip
+
+    random = np.random.default_rng(5)
+    for frame in (1, 2):
+        image = (random.random((163, 259, 4)) * 65535).astype(np.uint16)
+        write_image(tmp_path / f"in.{frame}.png", image)
+    clip = str(tmp_path / "in.#.png")
+    render(EDITED, clip, tmp_path / f"whole.{out}", **more)
+    monkeypatch.setattr(clip_base, "STRIP", 259 * 13)
+    render(EDITED, clip, tmp_path / f"strips.{out}", **more)
+    whole, strips = (open_clip(str(tmp_path / f"{name}.{out}")) for name in ("whole", "strips"))
+    for frame in (0, 1):
+        assert whole.read(frame).tobytes() == strips.read(frame).tobytes()
+
+
 def test_the_arrays_of_a_clip_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rendering, "LARGE", 100)
     images = np.random.default_rng(1).random((2, 16, 16, 3)).astype(np.float32)
@@ -79,7 +107,7 @@ def test_the_arrays_of_a_clip_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("out", ["o.#.exr", "o.#.png"])
+@pytest.mark.parametrize("out", ["o.#.exr", "o.#.png", "o.mov"])
 def test_8k_takes_less_than_a_gigabyte(tmp_path: Path, out: str) -> None:
     row = np.linspace(0, 1, 7680, dtype=np.float32)
     image = np.empty((4320, 7680, 3), np.float16)

@@ -48,9 +48,12 @@ STRIP = 4_000_000
 """Pixels of a strip of a large frame: what is computed of it needs little more memory."""
 
 
-def strips(height: int, width: int) -> Iterator[slice]:
-    """Yield slices of rows that divide a picture into strips of about `STRIP` pixels."""
-    rows = max(1, STRIP // max(1, width))
+def strips(height: int, width: int, together: int = 1) -> Iterator[slice]:
+    """Yield slices of rows that divide a picture into strips of about `STRIP` pixels.
+
+    All but the last one have a multiple of `together` rows.
+    """
+    rows = max(1, STRIP // max(1, width) // together) * together
     for top in range(0, height, rows):
         yield slice(top, min(top + rows, height))
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import functools
 import itertools
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ from numpy.typing import NDArray
 
 from palette4d.common.files import replacing
 from palette4d.common.message import Arg
-from palette4d.media.clip_base import F32
+from palette4d.media.clip_base import F32, strips
 from palette4d.media.codecs import Codec, codec_for
 from palette4d.media.colour_tags import LUMA_WEIGHTS, UNKNOWN
 from palette4d.media.frame_writer import OutputError, with_alpha_of
@@ -32,6 +31,9 @@ from palette4d.media.stated import Stated
 
 #: FFmpeg's numbers: interlaced, top or bottom field first, in which order the lines are stored.
 _FIELD_ORDERS = {"tff": (2, 4), "bff": (3, 5)}
+
+#: Rows of a picture that share chroma samples at most: two of each field.
+_ROWS = 4
 
 
 @dataclass(frozen=True)
@@ -174,7 +176,7 @@ def movie_writer(
 
                 def append(pixels: F32, premultiplied: bool) -> None:
                     nonlocal count
-                    picture = _picture(_with_alpha(pixels, premultiplied, how), how)
+                    picture = _picture(pixels, premultiplied, how)
                     picture.pts, picture.time_base = count, 1 / rate
                     picture = field_flags.set(picture)
                     # ProRes reads its tags from the picture, H.264 from the stream.
@@ -283,34 +285,58 @@ def _with_alpha(pixels: F32, premultiplied: bool, how: Delivery) -> F32:
     return pixels[..., :3] * (np.float32(1) if premultiplied else pixels[..., 3:])
 
 
-def _picture(pixels: F32, how: Delivery) -> av.VideoFrame:
-    """R'G'B'(A) (h, w, 3 or 4) as Y'CbCr(A) (ITU-T H.273, section 8.3), rounded once.
+def _picture(pixels: F32, premultiplied: bool, how: Delivery) -> av.VideoFrame:
+    """R'G'B'(A) (h, w, 3 or 4) as Y'CbCr(A), made strip by strip.
+
+    An odd size grows: the last column or row is repeated.
+    """
+    codec = how.codec
+    height, width = pixels.shape[:2]
+    below, right = -height % how.rows, -width % codec.across
+    layout = codec.alpha_layout if how.alpha else codec.layout
+    picture = av.VideoFrame(width + right, height + below, layout)
+    picture.colorspace = how.stated.tags.matrix
+    picture.color_range = 2 if how.stated.tags.full_range else 1
+    lines = [_lines(plane) for plane in picture.planes]
+    for rows in strips(picture.height, picture.width, _ROWS):
+        part = _with_alpha(pixels[rows], premultiplied, how)
+        missing = rows.stop - rows.start - len(part)
+        part = np.pad(part, ((0, missing), (0, right), (0, 0)), "edge")
+        for plane, samples in enumerate(_planes(part, how)):
+            top = rows.start * len(lines[plane]) // picture.height
+            lines[plane][top : top + len(samples), : samples.shape[1]] = samples
+    for plane, stored in zip(picture.planes, lines, strict=True):
+        plane.update(stored.tobytes())
+    return picture
+
+
+def _lines(plane: Any) -> NDArray[Any]:
+    """Return empty lines for a plane's samples, as long as those in memory."""
+    kind = np.dtype("<u2" if plane.line_size >= 2 * plane.width else "u1")
+    return np.zeros((plane.height, plane.line_size // kind.itemsize), kind)
+
+
+def _planes(pixels: F32, how: Delivery) -> Iterator[NDArray[np.floating[Any]]]:
+    """Yield the samples of each plane (ITU-T H.273, section 8.3), rounded once.
 
     libswscale has errors of up to one 8-bit step, and is on average half a step too bright.
     """
     codec, tags = how.codec, how.stated.tags
-    height, width = pixels.shape[:2]
-    pad = ((0, -height % how.rows), (0, -width % codec.across), (0, 0))
-    pixels = np.nan_to_num(np.pad(pixels, pad, "edge"), nan=0.0, posinf=1.0, neginf=0.0)
+    pixels = np.nan_to_num(pixels, nan=0.0, posinf=1.0, neginf=0.0)
     # Far beyond what Y'CbCr holds, so that only its own limits clamp the colours.
     room = 1 if how.stated.headroom else 0
     pixels = np.clip(pixels, -room, 1 + room)
     red, blue = LUMA_WEIGHTS[tags.matrix]
     luma = pixels[..., :3] @ np.array([red, 1 - red - blue, blue], np.float32)
-    layout = codec.alpha_layout if how.alpha else codec.layout
-    picture = av.VideoFrame(pixels.shape[1], pixels.shape[0], layout)
-    picture.colorspace, picture.color_range = tags.matrix, 2 if tags.full_range else 1
     unit, top = 1 << (codec.bits - 8), (1 << codec.bits) - 1
     black, white, span = (0, top, top) if tags.full_range else (16 * unit, 219 * unit, 224 * unit)
     limits = (0, top) if tags.full_range else (unit, 255 * unit - 1)
-    fill = functools.partial(_fill, limits=limits)
-    fill(picture.planes[0], black + white * luma)
-    for plane, channel, weight in ((1, 2, blue), (2, 0, red)):
+    yield np.clip(np.rint(black + white * luma), *limits)
+    for channel, weight in ((2, blue), (0, red)):
         chroma = (pixels[..., channel] - luma) * np.float32(span / (2 * (1 - weight)))
-        fill(picture.planes[plane], 128 * unit + _shared(chroma, how))
+        yield np.clip(np.rint(128 * unit + _shared(chroma, how)), *limits)
     if how.alpha:
-        _fill(picture.planes[3], np.clip(pixels[..., 3], 0, 1) * top, (0, top))
-    return picture
+        yield np.clip(np.rint(np.clip(pixels[..., 3], 0, 1) * top), 0, top)
 
 
 def _shared(chroma: F32, how: Delivery) -> F32:
@@ -327,10 +353,3 @@ def _shared(chroma: F32, how: Delivery) -> F32:
     upper = 0.75 * rows[:, 0] + 0.25 * rows[:, 2]
     lower = 0.25 * rows[:, 1] + 0.75 * rows[:, 3]
     return np.stack([upper, lower], axis=1).reshape(-1, chroma.shape[1]).astype(np.float32)
-
-
-def _fill(plane: Any, samples: NDArray[np.floating[Any]], limits: tuple[int, int]) -> None:
-    kind = np.dtype("<u2" if plane.line_size >= 2 * plane.width else "u1")
-    lines = np.zeros((plane.height, plane.line_size // kind.itemsize), kind)
-    lines[:, : plane.width] = np.clip(np.rint(samples), *limits)
-    plane.update(lines.tobytes())
