@@ -302,11 +302,11 @@ def _picture(pixels: F32, premultiplied: bool, how: Delivery) -> av.VideoFrame:
         part = _with_alpha(pixels[rows], premultiplied, how)
         missing = rows.stop - rows.start - len(part)
         part = np.pad(part, ((0, missing), (0, right), (0, 0)), "edge")
-        for plane, samples in enumerate(_planes(part, how)):
-            top = rows.start * len(lines[plane]) // picture.height
-            lines[plane][top : top + len(samples), : samples.shape[1]] = samples
-    for plane, stored in zip(picture.planes, lines, strict=True):
-        plane.update(stored.tobytes())
+        for k, samples in enumerate(_planes(part, how)):
+            top = rows.start * len(lines[k]) // picture.height
+            lines[k][top : top + len(samples), : samples.shape[1]] = samples
+    for target, stored in zip(picture.planes, lines, strict=True):
+        target.update(stored.tobytes())
     return picture
 
 
