@@ -108,6 +108,19 @@ def test_a_locked_colour_that_is_changed_by_hand_is_said(opened: Window) -> None
     assert opened.session.status.text == texts.UNDONE
 
 
+def test_the_playhead_goes_from_handle_to_handle(opened: Window) -> None:
+    document, session = opened.session.document, opened.session
+    assert document is not None
+    frames = sorted({round(float(t)) for t in document.core.polytope.vertices[:, 3]})
+    for way, wanted in (("next_handle", frames), ("previous_handle", frames[::-1])):
+        session.go(wanted[0])
+        seen = [session.frame]
+        for _ in frames:
+            opened.commands.calls[way]()
+            seen.append(session.frame)
+        assert seen == [*wanted, wanted[-1]]
+
+
 def test_arrows_in_and_out_points_and_playing(opened: Window, qtbot: Any) -> None:
     session = opened.session
     QTest.keyClick(opened, Qt.Key.Key_Right)

@@ -23,32 +23,23 @@ from palette4d.common.text import printable
 #: Longest text of an event, in characters: hosts read the end of the file only.
 LONGEST = 8000
 
-_stream: IO[str] | None = None
+#: Where events go: nowhere, if no program waits.
+stream: IO[str] | None = None
 
 
 @contextlib.contextmanager
 def events_to(path: str | None) -> Iterator[None]:
     """Write the events of the body to a file, to standard error ("-"), or nowhere."""
-    global _stream
+    global stream
     with contextlib.ExitStack() as stack:
         if path == "-":
-            _stream = sys.stderr
+            stream = sys.stderr
         elif path is not None:
-            _stream = stack.enter_context(Path(path).open("w", encoding="utf-8"))
+            stream = stack.enter_context(Path(path).open("w", encoding="utf-8"))
         try:
             yield
         finally:
-            _stream = None
-
-
-def waits() -> bool:
-    """Whether a program waits for events."""
-    return _stream is not None
-
-
-def on_stderr() -> bool:
-    """Whether standard error is for events alone."""
-    return _stream is sys.stderr
+            stream = None
 
 
 def shown(text: str) -> str:
@@ -58,5 +49,5 @@ def shown(text: str) -> str:
 
 def event(**parts: object) -> None:
     """Write an event, if a program waits for it."""
-    if _stream is not None:
-        print(json.dumps(parts, ensure_ascii=False), file=_stream, flush=True)
+    if stream is not None:
+        print(json.dumps(parts, ensure_ascii=False), file=stream, flush=True)

@@ -23,7 +23,7 @@ def progress_bar(what: str, *, total: int | None, unit: str, hidden: bool) -> An
     """
     from tqdm import tqdm
 
-    if not job.waits():
+    if job.stream is None:
         file = unfiltered_stderr()
         return tqdm(total=total, desc=what, unit=unit, disable=hidden or None, file=file)
 

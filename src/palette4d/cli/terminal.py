@@ -77,7 +77,7 @@ def tell(args: argparse.Namespace, kind: str, text: str) -> None:
     """Print a message, and tell it a program that waits: an "error", a "warning" or a "note"."""
     message = Message(text)
     job.event(**{kind: [_event(part, args.parser) for part in message.parts]})
-    if not job.on_stderr():
+    if job.stream is not sys.stderr:
         # A name with a line break must not look like a message of its own.
         words = message.said(lambda arg: option_of(arg, args.parser)).replace("\n", "\n  ")
         print(

@@ -56,7 +56,6 @@ class Job:
 
     def __init__(self, words: Sequence[str], changed: Callable[["Job"], object]) -> None:
         """Start it."""
-        self.words = tuple(words)
         self.what, self.fraction = "", None  # type: tuple[str, float | None]
         self.output = self.messages = ""
         self.advised: list[str] = []
@@ -76,11 +75,6 @@ class Job:
         self._events = threading.Thread(target=self._read_events, name="palette4d job", daemon=True)
         self._events.start()
         threading.Thread(target=self._wait, name="palette4d job", daemon=True).start()
-
-    @property
-    def command(self) -> str:
-        """The command line that does the same."""
-        return command_line(self.words)
 
     def cancel(self) -> None:
         """End it as Ctrl-C does; a child that does not end is killed."""

@@ -51,6 +51,9 @@ class MenuActions:
             "show_before": lambda: session.look(compare="before"),
             "show_wipe": lambda: session.look(compare="wipe"),
             "show_side": lambda: session.look(compare="side"),
+            "compare": lambda: session.look(  # the key does so while it is down
+                compare="after" if session.view.compare == "before" else "before"
+            ),
             "fit": viewer.fit,
             "one_to_one": lambda: viewer.zoom_to(1.0, viewer.pointer),
             "zoom_in": lambda: viewer.zoom_by(ZOOM, viewer.pointer),
@@ -75,14 +78,14 @@ class MenuActions:
             "previous_frame": lambda: self._step(-1),
             "ten_on": lambda: self._step(10),
             "ten_back": lambda: self._step(-10),
+            "next_handle": lambda: self._to_handle(1),
+            "previous_handle": lambda: self._to_handle(-1),
             "first_frame": lambda: session.go(window.playback.span()[0]),
             "last_frame": lambda: session.go(window.playback.span()[1]),
             "mark_in": lambda: session.mark(start=session.frame),
             "mark_out": lambda: session.mark(end=session.frame),
             "clear_marks": session.mark,
         }
-
-    # ------------------------------------------------------------------------------------ editing
 
     def cancel(self) -> None:
         """Forget a drag; else select nothing."""
@@ -115,8 +118,6 @@ class MenuActions:
         if place is not None:
             act(place)
 
-    # ----------------------------------------------------------------------------------- versions
-
     def use_version(self, number: int) -> None:
         """Use the n-th version."""
         names = self.session.versions
@@ -141,15 +142,6 @@ class MenuActions:
         else:
             self.session.say(texts.COMPARED.format(name=name) if name else texts.COMPARED_SOURCE)
 
-    # --------------------------------------------------------------------------------------- view
-
-    def compare(self) -> None:
-        """Show the other picture; the key does so while it is down."""
-        after = self.session.view.compare != "before"
-        self.session.look(compare="before" if after else "after")
-
-    # ----------------------------------------------------------------------------------- playback
-
     def _shuttle(self, way: int) -> None:
         now = self.session.playing
         self.session.play(way if now * way <= 0 else max(-FASTEST, min(FASTEST, now * 2)))
@@ -159,17 +151,11 @@ class MenuActions:
             self.session.play(0)
         self.session.step(frames)
 
-    def next_handle(self) -> None:
-        """Go to the next frame with a handle."""
-        later = [frame for frame in self.handle_frames() if frame > self.session.frame]
-        if later:
-            self.session.go(later[0])
-
-    def previous_handle(self) -> None:
-        """Go to the frame with a handle before."""
-        earlier = [frame for frame in self.handle_frames() if frame < self.session.frame]
-        if earlier:
-            self.session.go(earlier[-1])
+    def _to_handle(self, way: int) -> None:
+        frames = self.handle_frames()[::way]
+        beyond = (frame for frame in frames if (frame - self.session.frame) * way > 0)
+        if (frame := next(beyond, None)) is not None:
+            self.session.go(frame)
 
     def handle_frames(self) -> list[int]:
         """Return the frames of vertices and stops, in order."""

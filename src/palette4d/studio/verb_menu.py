@@ -136,78 +136,55 @@ class VerbMenu:
 
     def render(self) -> VerbDialog:
         """Write the recoloured clip."""
-        path = self.session.path
-        assert path is not None
-        stem = path.name.removesuffix(".p4d.json")
         marks = self.session.marks
-        return self._verb(
+        compared = ("", "wipe", "side")
+        return self._from_sidecar(
             texts.RENDER,
             "render",
-            [
-                Field("", texts.SIDECAR, "open", str(path)),
-                Field("", texts.CLIP, "open", self._clip_source),
-                Field("-o", texts.OUTPUT, "save", str(path.with_name(f"{stem}_graded.mp4"))),
-                Field("--frames", value="{}-{}".format(*marks) if marks else ""),
-                Field(
-                    "--compare",
-                    texts.COMPARE_LABEL,
-                    "choice",
-                    "",
-                    ("", "wipe", "side"),
-                    texts.NO_COMPARE,
-                ),
-                Field("--bits", texts.BITS, "choice", "", ("", "8", "16", "32"), texts.BITS_HINT),
-                Field("--half", kind="check"),
-                Field("--force", kind="check"),
-            ],
+            Field("", texts.CLIP, "open", self._clip_source),
+            Field("-o", texts.OUTPUT, "save", self._beside("_graded.mp4")),
+            Field("--frames", value="{}-{}".format(*marks) if marks else ""),
+            Field("--compare", texts.COMPARE_LABEL, "choice", "", compared, texts.NO_COMPARE),
+            Field("--bits", texts.BITS, "choice", "", ("", "8", "16", "32"), texts.BITS_HINT),
+            Field("--half", kind="check"),
         )
+
+    def _from_sidecar(self, title: str, verb: str, *fields: Field) -> VerbDialog:
+        sidecar = Field("", texts.SIDECAR, "open", str(self.session.path))
+        return self._verb(title, verb, [sidecar, *fields, Field("--force", kind="check")])
+
+    def _beside(self, ending: str) -> str:
+        assert self.session.path is not None
+        return beside(self.session.path, ending)
 
     def bake(self) -> VerbDialog:
         """Write a LUT of this frame."""
-        path = self.session.path
-        assert path is not None
-        frame = self.session.frame
-        return self._verb(
+        frame = str(self.session.frame)
+        return self._from_sidecar(
             texts.BAKE,
             "bake",
-            [
-                Field("", texts.SIDECAR, "open", str(path)),
-                Field("--frame", texts.FRAME_FIELD, value=str(frame)),
-                Field("-o", texts.OUTPUT, "save", beside(path, f"_{frame}.cube")),
-                Field("--size", hint="33"),
-                Field("--force", kind="check"),
-            ],
+            Field("--frame", texts.FRAME_FIELD, value=frame),
+            Field("-o", texts.OUTPUT, "save", self._beside(f"_{frame}.cube")),
+            Field("--size", hint="33"),
         )
 
     def export(self) -> VerbDialog:
         """Write LUTs over time."""
-        path = self.session.path
-        assert path is not None
-        return self._verb(
+        return self._from_sidecar(
             texts.EXPORT,
             "export",
-            [
-                Field("", texts.SIDECAR, "open", str(path)),
-                Field("--every", value="1"),
-                Field("-o", texts.FOLDER, "folder", beside(path, "_luts")),
-                Field("--format", texts.FORMAT, hint="cube"),
-                Field("--force", kind="check"),
-            ],
+            Field("--every", value="1"),
+            Field("-o", texts.FOLDER, "folder", self._beside("_luts")),
+            Field("--format", texts.FORMAT, hint="cube"),
         )
 
     def config(self) -> VerbDialog:
         """Write an OpenColorIO config with the looks."""
-        path = self.session.path
-        assert path is not None
-        return self._verb(
+        return self._from_sidecar(
             texts.CONFIG_WORK,
             "config",
-            [
-                Field("", texts.SIDECAR, "open", str(path)),
-                Field("-o", texts.FOLDER, "folder", beside(path, "_config")),
-                Field("--base", kind="open"),
-                Field("--force", kind="check"),
-            ],
+            Field("-o", texts.FOLDER, "folder", self._beside("_config")),
+            Field("--base", kind="open"),
         )
 
     def install(self) -> VerbDialog:
