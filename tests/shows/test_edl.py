@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import time
 from fractions import Fraction
 from pathlib import Path
 
@@ -235,6 +237,29 @@ class TestCdl:
         (clip,) = made.find_clips()
         assert list(clip.metadata["cdl"]["asc_sop"]["slope"]) == [1.1, 0.9, 1.0]
         assert clip.metadata["cdl"]["asc_sat"] == 0.9
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "001 " + "a " * 200_000,
+        f"001 A V C {FOUR} {FOUR}\nM2 " + "1 " * 200_000 + "x",
+        f"001 A V C {FOUR} {FOUR}\n* ASC_SOP " + "(" * 200_000,
+        "9" * 5000 + f" A V C {FOUR} {FOUR}",
+        f"001 A V C {'9' * 400} {'9' * 400} {FOUR}",
+    ],
+    ids=["event", "M2", "CDL", "number", "frames"],
+)
+def test_hostile_lines_take_no_time(line: str, tmp_path: Path) -> None:
+    begin = time.process_time()
+    with contextlib.suppress(Palette4dError):
+        clips(HEAD + line + "\n", tmp_path)
+    assert time.process_time() - begin < 5
+
+
+def test_a_rate_of_decimals_is_the_ntsc_rate(tmp_path: Path) -> None:
+    (clip,) = clips(HEAD + event(FOUR, FOUR), tmp_path, Fraction("23.976"))
+    assert clip.rate == Fraction(24000, 1001)
 
 
 def test_a_long_edl_takes_linear_time(tmp_path: Path) -> None:

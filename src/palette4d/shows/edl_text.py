@@ -22,6 +22,8 @@ _LINE = re.compile(
     + r"\s+".join([_TIME] * 4)
     + r"\s*"
 )
+#: The most characters of a line that are read.
+LONGEST = 1000
 _SHAPE = "001 A001C001 V C 01:00:00:00 01:00:02:00 01:00:00:00 01:00:02:00"
 
 
@@ -101,7 +103,7 @@ def _blocks(text: str, rate: Fraction) -> Iterator[tuple[list[EventLine], tuple[
     comments: list[str] = []
     place = 0
     for index, raw in enumerate(text.splitlines(), start=1):
-        line = raw.strip()
+        line = raw[:LONGEST].strip()  # patterns take long for lines that no program writes
         if line.startswith("FCM:"):
             drop = "NON" not in line.upper() and "DROP" in line.upper()
         elif line[:1].isdigit():

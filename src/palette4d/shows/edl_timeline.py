@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from palette4d.common.errors import Arg, Palette4dError
-from palette4d.media.clip_base import DEFAULT_RATE
+from palette4d.media.clip_base import DEFAULT_RATE, as_rate
 from palette4d.shows import edl_cdl, edl_text
 from palette4d.shows.edl_text import UNFOLLOWED, Event, Motion
 
@@ -25,7 +25,8 @@ def timeline_of(path: Path, data: bytes, rate: Fraction | None, otio: Any) -> An
 
     `otio` is OpenTimelineIO. `Palette4dError` says which line is no event.
     """
-    return _made(path, data, rate or DEFAULT_RATE, otio)[0]
+    known = None if rate is None else as_rate(float(rate))
+    return _made(path, data, known or DEFAULT_RATE, otio)[0]
 
 
 def places_of(path: Path, data: bytes, rate: Fraction, otio: Any) -> dict[tuple[int, ...], int]:
