@@ -13,7 +13,10 @@ MvcWorker::Stage<T>::Stage(const PlanMemory<T>& memory, const Kernels<T>& of)
     : plan(memory.plan()),
       usable(memory.usable()),
       kernels(of),
-      scratch(usable ? plan : Plan<T>{}) {}
+      scratch(usable ? plan : Plan<T>{}) {
+    plan.convex = false;
+    plan.beyond = true;
+}
 
 template <class T>
 template <class From, class To, class Failed>
@@ -25,9 +28,9 @@ void MvcWorker::Stage<T>::run(std::size_t count, const From& from, const To& to,
         const std::size_t size = std::min(kSize, count - at);
         if (usable) {
             for (std::size_t i = 0; i < size; ++i) {
-                for (std::size_t c = 0; c < 3; ++c) block.high[c][i] = from(at + i)[c];
+                for (std::size_t c = 0; c < 3; ++c) block.colour[c][i] = from(at + i)[c];
             }
-            kernels.mean_value(plan, block, static_cast<int>(size), tolerance, scratch.data());
+            kernels.inside(plan, block, static_cast<int>(size), tolerance, T(0), scratch.data());
         }
         for (std::size_t i = 0; i < size; ++i) {
             if (usable && block.verdict[i] > 0) {

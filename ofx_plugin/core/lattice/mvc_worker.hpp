@@ -23,7 +23,7 @@ private:
     /// The kernel of one precision.
     template <class T>
     struct Stage {
-        const Plan<T>& plan;
+        Plan<T> plan;
         const bool usable;
         const Kernels<T> kernels;
         Scratch<T> scratch;

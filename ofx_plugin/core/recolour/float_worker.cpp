@@ -8,7 +8,6 @@
 #include "recolour/double_worker.hpp"
 #include "recolour/recolour_plan.hpp"
 #include "simd/kernel_choice.hpp"
-#include "simd/split.hpp"
 
 namespace palette4d {
 
@@ -16,13 +15,8 @@ namespace {
 
 /// In place of the palette's kernels where no vertex moves.
 template <class T>
-void all_inside(const Plan<T>&, Block<T>& block, int count, T, T, T*) {
-    std::fill_n(block.verdict, count, T(1));
-}
-template <class T>
-void stay(const Plan<T>&, Block<T>& block, int, T, T*) {
+void stay(const Plan<T>&, Block<T>& block, int, T, T, T*) {
     for (T(&channel)[Block<T>::kSize] : block.moved) std::fill(channel, std::end(channel), T(0));
-    // All are known, whatever the block held before.
     std::fill_n(block.verdict, Block<T>::kSize, T(1));
 }
 
@@ -34,11 +28,12 @@ public:
     Pipeline(const Recolourer& recolourer, const RecolourOptions& options, int channels, bool picks)
         : divide_(options.premultiplied),
           channels_(channels),
+          kernels_(kernels_of<MvcKernels>(options.instructions)),
           one_by_one_(recolourer, options, channels, picks),
-          twofold_(recolourer.plan().twofold, kernels_of<MvcKernels>(options.instructions).twofold,
+          twofold_(recolourer.plan().twofold, kernels_.twofold,
                    picks ? kernels_of<PickKernels>(options.instructions).add_twofold : nullptr,
                    options, one_by_one_),
-          single_(recolourer.plan().single, kernels_of<MvcKernels>(options.instructions).single,
+          single_(recolourer.plan().single, kernels_.single,
                   picks ? kernels_of<PickKernels>(options.instructions).add_single : nullptr,
                   options, twofold_) {}
 
@@ -47,11 +42,7 @@ public:
         for (int x = 0; x < width; x += kSize) {
             const int count = std::min(kSize, width - x);
             const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(x) * channels_;
-            if (channels_ == 3) {
-                single_.run<3>(from + at, to + at, count);
-            } else {
-                single_.run<4>(from + at, to + at, count);
-            }
+            single_.run(kernels_, from + at, to + at, channels_, count);
         }
     }
 
@@ -84,10 +75,8 @@ private:
         Stage(const PlanOf<T>& plan, const Kernels<T>& kernels, AddPicks add_picks,
               const RecolourOptions& options, Next& next)
             : plan_(plan.palette.plan()),
-              usable_(plan.palette.usable()),
-              kernels_(usable_ && plan_.mover_count == 0
-                           ? Kernels<T>{&all_inside<T>, &stay<T>, &stay<T>, kernels.move}
-                           : kernels),
+              kernels_(plan_.mover_count == 0 ? Kernels<T>{&stay<T>, nullptr, kernels.move}
+                                              : kernels),
               picks_(plan.picks.plan()),
               add_picks_(picks_.empty() ? nullptr : add_picks),
               strength_(static_cast<T>(options.strength)),
@@ -98,79 +87,47 @@ private:
                   std::max(1 / std::abs(options.strength), static_cast<double>(plan_.spread)))),
               next_(next),
               scratch_(plan_) {
-            if (!usable_) return;
             // Many colours lie exactly on the surface, where a channel is 0 or 1: they use the
             // closest point. The surface itself is rounded by about `step`. Where a step of that
             // length matters, the next stage decides.
-            const T step = 16 * std::numeric_limits<T>::epsilon() * plan_.extent;
-            if (step * plan_.steepness > tolerance_ / 4) {
-                shell_ = step;
-                at_surface_ = 0;
-            }
+            const T step = std::numeric_limits<T>::epsilon() * plan_.size * plan_.steepness;
+            if (16 * step > tolerance_ / 4) shell_ = 16 * step / plan_.steepness;
+            usable_ = plan.palette.usable() && step <= tolerance_ / 8;
         }
 
         /// Up to Block::kSize adjacent pixels.
-        template <int Channels>
-        void run(const float* in, float* out, int count) {
+        void run(const MvcKernels& kernels, const float* in, float* out, int channels, int count) {
             Batch& batch = incoming_;
-            bool good[kSize];
-            bool all_good = true;
-            for (int i = 0; i < count; ++i) {
-                const float* pixel = in + i * Channels;
-                for (int c = 0; c < 3; ++c) batch.block.high[c][i] = pixel[c];
-                good[i] = recolourable(pixel, Channels == 4 && divide_);
-                all_good &= good[i];
+            const bool good = kernels.read(in, channels, count, divide_, batch.block);
+            if (displace(batch.block, count) && good) {
+                kernels.write(batch.block, channels, count, out);
+                count_ += count;
+                return;
             }
-            if (Channels == 4 && divide_) {
-                for (int i = 0; i < count; ++i) {
-                    if (good[i]) batch.divide(i, in[i * 4 + 3]);
-                }
-            }
-            if (usable_) {
-                kernels_.classify(plan_, batch.block, count, shell_, at_surface_, scratch_.data());
-            } else {
-                for (int i = 0; i < count; ++i) batch.block.verdict[i] = 0;
-            }
-            const Kernel kernel = all_good ? same_kernel(batch.block, count) : nullptr;
-            if (kernel) {
-                displace(kernel, batch.block, count);
-            }
-            for (int i = 0; i < count; ++i) {
-                const float* from = in + i * Channels;
-                float* to = out + i * Channels;
-                if (Channels == 4) to[3] = from[3];
-                if (!good[i]) {
-                    for (int c = 0; c < 3; ++c) to[c] = from[c];
-                } else if (!kernel) {
-                    add(batch, i, from, to);
-                } else if (batch.block.verdict[i] > 0) {
-                    for (int c = 0; c < 3; ++c) to[c] = static_cast<float>(batch.block.moved[c][i]);
-                    ++count_;
+            for (int i = 0; i < count; ++i, in += channels, out += channels) {
+                if (channels == 4) out[3] = in[3];
+                if (good || recolourable(in, divide_)) {
+                    settle(batch, i, in, out);
                 } else {
-                    next_.recolour(from, to);
+                    for (int c = 0; c < 3; ++c) out[c] = in[c];
                 }
             }
         }
 
         /// Recolours one pixel that is recolourable(); `to` may be `from`.
         void recolour(const float* from, float* to) {
-            if (!usable_) {
-                next_.recolour(from, to);
-                return;
-            }
             Batch& batch = incoming_;
             const int at = batch.count++;
             batch.from[at] = from;
             batch.to[at] = to;
-            for (int c = 0; c < 3; ++c) batch.block.high[c][at] = from[c];
+            for (int c = 0; c < 3; ++c) batch.block.colour[c][at] = from[c];
             if (divide_) batch.divide(at, from[3]);
             if (batch.count == kSize) sort();
         }
 
         void finish() {
             sort();
-            flush(sorted_[0], kernels_.mean_value);
-            flush(sorted_[1], kernels_.closest);
+            flush();
         }
 
         long long count() const { return count_; }
@@ -179,7 +136,6 @@ private:
         static constexpr int kSize = Block<T>::kSize;
         /// Above this, differences of channels have too few digits for the amounts of picks.
         static constexpr T kLargestPicked = 8;
-        using Kernel = void (*)(const Plan<T>&, Block<T>&, int, T, T*);
 
         struct Batch {
             Block<T> block{};
@@ -190,109 +146,97 @@ private:
             void divide(int at, float by) {
                 block.alpha[at] = by;
                 for (int c = 0; c < 3; ++c) {
-                    block.seen[c][at] = block.high[c][at];
-                    const double colour = straight<double>(block.seen[c][at], by);
-                    split(colour, block.high[c][at], block.low[c][at]);
+                    block.seen[c][at] = block.colour[c][at];
+                    block.colour[c][at] = static_cast<T>(straight<double>(block.seen[c][at], by));
                 }
             }
         };
 
-        void displace(Kernel kernel, Block<T>& block, int count) {
-            kernel(plan_, block, count, tolerance_, scratch_.data());
+        /// Whether all colours are inside and their results guaranteed.
+        bool displace(Block<T>& block, int count) {
+            if (usable_) {
+                kernels_.inside(plan_, block, count, tolerance_, shell_, scratch_.data());
+                finish(block, count);
+            } else {
+                std::fill_n(block.verdict, count, T(0));
+            }
+            int inside = 0;
+            for (int i = 0; i < count; ++i) inside += block.verdict[i] > 0;
+            return inside == count;
+        }
+
+        /// Adds the picks, and applies the strength.
+        void finish(Block<T>& block, int count) {
             if (add_picks_) {
-                add_picks_(picks_, block.high, block.moved, count);
+                add_picks_(picks_, block.colour, block.moved, count);
                 for (int i = 0; sizeof(T) == sizeof(float) && i < count; ++i) {
-                    const T size =
-                        std::max(std::abs(block.high[0][i]),
-                                 std::max(std::abs(block.high[1][i]), std::abs(block.high[2][i])));
-                    if (!(size <= kLargestPicked)) block.verdict[i] = 0;
+                    const T size = std::max(
+                        std::abs(block.colour[0][i]),
+                        std::max(std::abs(block.colour[1][i]), std::abs(block.colour[2][i])));
+                    if (!(size <= kLargestPicked) && block.verdict[i] > 0) block.verdict[i] = 0;
                 }
             }
             kernels_.move(block, count, strength_, divide_);
         }
 
-        /// The kernel for the whole block when its verdicts agree, else null.
-        Kernel same_kernel(const Block<T>& block, int count) const {
-            int inside = 0, outside = 0;
-            for (int i = 0; i < count; ++i) {
-                inside += block.verdict[i] > 0;
-                outside += block.verdict[i] < 0;
-            }
-            return inside == count    ? kernels_.mean_value
-                   : outside == count ? kernels_.closest
-                                      : nullptr;
-        }
-
         void sort() {
             Batch& batch = incoming_;
             if (batch.count == 0) return;
-            kernels_.classify(plan_, batch.block, batch.count, shell_, at_surface_,
-                              scratch_.data());
-            if (const Kernel kernel = same_kernel(batch.block, batch.count)) {
-                flush(batch, kernel);
-                return;
-            }
-            for (int i = 0; i < batch.count; ++i) add(batch, i, batch.from[i], batch.to[i]);
+            displace(batch.block, batch.count);
+            for (int i = 0; i < batch.count; ++i) settle(batch, i, batch.from[i], batch.to[i]);
             batch.count = 0;
         }
 
-        /// Adds the pixel to the batch that its verdict selects.
-        void add(const Batch& batch, int i, const float* from, float* to) {
+        /// Writes the pixel, or hands it on as its verdict says.
+        void settle(const Batch& batch, int i, const float* from, float* to) {
             const T verdict = batch.block.verdict[i];
-            if (verdict == 0) {
-                next_.recolour(from, to);
-                return;
-            }
-            Batch& other = sorted_[verdict < 0];  // no branch: it would be mispredicted
-            const int at = other.count++;
-            other.from[at] = from;
-            other.to[at] = to;
-            for (int c = 0; c < 3; ++c) other.block.high[c][at] = batch.block.high[c][i];
-            if (divide_) {
-                other.block.alpha[at] = batch.block.alpha[i];
+            if (verdict < 0) {
+                const int at = outside_.count++;
+                outside_.from[at] = from;
+                outside_.to[at] = to;
                 for (int c = 0; c < 3; ++c) {
-                    other.block.low[c][at] = batch.block.low[c][i];
-                    other.block.seen[c][at] = batch.block.seen[c][i];
+                    outside_.block.colour[c][at] = batch.block.colour[c][i];
+                    outside_.block.seen[c][at] = batch.block.seen[c][i];
                 }
-            }
-            if (other.count == kSize) {
-                flush(other, verdict < 0 ? kernels_.closest : kernels_.mean_value);
+                outside_.block.alpha[at] = batch.block.alpha[i];
+                if (outside_.count == kSize) flush();
+            } else if (verdict > 0) {
+                for (int c = 0; c < 3; ++c) to[c] = static_cast<float>(batch.block.moved[c][i]);
+                ++count_;
+            } else {
+                next_.recolour(from, to);
             }
         }
 
-        void flush(Batch& batch, Kernel kernel) {
-            if (batch.count == 0) return;
-            displace(kernel, batch.block, batch.count);
-            for (int i = 0; i < batch.count; ++i) {
-                float* to = batch.to[i];
-                if (batch.block.verdict[i] > 0) {
-                    for (int c = 0; c < 3; ++c) to[c] = static_cast<float>(batch.block.moved[c][i]);
-                    ++count_;
-                } else {
-                    next_.recolour(batch.from[i], to);
-                }
+        void flush() {
+            if (outside_.count == 0) return;
+            const int count = outside_.count;
+            outside_.count = 0;
+            kernels_.closest(plan_, outside_.block, count, tolerance_, scratch_.data());
+            finish(outside_.block, count);
+            for (int i = 0; i < count; ++i) {
+                settle(outside_, i, outside_.from[i], outside_.to[i]);
             }
-            batch.count = 0;
         }
 
         const Plan<T>& plan_;
-        const bool usable_;
         const Kernels<T> kernels_;
         const PickPlan<T> picks_;
         const AddPicks add_picks_;
         const T strength_;
         const bool divide_;
         const T tolerance_;
+        bool usable_;
         T shell_ = 0;
-        T at_surface_ = -1;
         Next& next_;
         Scratch<T> scratch_;
-        Batch incoming_, sorted_[2];  ///< inside, outside
+        Batch incoming_, outside_;
         long long count_ = 0;
     };
 
     const bool divide_;
     const int channels_;
+    const MvcKernels& kernels_;
     DoubleWorker one_by_one_;
     Stage<double, DoubleWorker> twofold_;
     Stage<float, Stage<double, DoubleWorker>> single_;

@@ -15,23 +15,27 @@ constexpr double kTurn[3][3] = {{-0.48, 0.6, 0.64}, {0.8, 0, 0.6}, {0.36, 0.8, -
 template <class T>
 struct Block {
     static constexpr int kSize = 64;
-    alignas(64) T high[3][kSize];  ///< the colours, and what their rounding to T left over
-    alignas(64) T low[3][kSize];
+    alignas(64) T colour[3][kSize];
     alignas(64) T seen[3][kSize];  ///< the colours as in a premultiplied picture, and their alpha
     alignas(64) T alpha[kSize];
-    alignas(
-        64) T moved[3][kSize];     ///< result: the displacement at strength 1, or what is seen then
+    /// Result: the displacement at strength 1, or what is seen then.
+    alignas(64) T moved[3][kSize];
     alignas(64) T verdict[kSize];  ///< result, see Kernels
 };
 
-/// One palette and its edit, rounded to T, as the formulas of mvc.cpp need them. Each
-/// position is split into two numbers, so that differences are exact to the last place.
+/// Numbers of T from one register in scratch memory to the next, whatever their size.
+template <class T>
+constexpr int kStride = 64 / static_cast<int>(sizeof(T));
+
+/// One palette and its edit, rounded to T, as the formulas of mvc.cpp need them.
 template <class T>
 struct Plan {
+    /// What a vertex and an edge take of scratch memory; references are places there.
+    static constexpr int kVertex = 9 * kStride<T>, kEdge = 3 * kStride<T>;
+
     struct Vertex {
-        T high[3], low[3];
-        T delta[3];  ///< its displacement
-        T ray[3];    ///< position from the first vertex, rotated; see Face::ray_normal
+        T at[3];
+        T ray[3];  ///< position from the first vertex, rotated; see Face::ray_normal
     };
     struct Mover {
         std::size_t vertex;
@@ -44,25 +48,23 @@ struct Plan {
     struct Face {
         std::size_t i, j, k;
         std::size_t jk, ik, ij;
-        T sign;  ///< -1 when the face has the opposite orientation
+        T area[3];  ///< the normal, outwards, times twice the area
+        T twice_area;
         /// The normal, rotated so that no edge of a real palette is parallel to the rays (third
         /// axis). It points up where ray_sign is +1.
         T ray_normal[3];
         T ray_sign;  ///< +1 when a ray upwards leaves the body through the face, -1 when it enters
     };
-    struct Plane {
-        T normal[3], offset;  ///< inside: normal . (p - first vertex) <= offset
-    };
     /// An edge of the surface: its start, direction, and displacement along it.
     struct Segment {
-        T high[3], low[3], along[3];
+        T start[3], along[3];
         T inverse_length2;
         T delta[3], change[3];
         T slope;  ///< largest displacement per unit of length
     };
     /// A face of the surface: its first corner and the gradients of the other two corners' weights.
     struct Triangle {
-        T high[3], low[3], normal[3], gradient_j[3], gradient_k[3];
+        T start[3], normal[3], gradient_j[3], gradient_k[3];
         T delta[3], change_j[3], change_k[3];
         T slope;
     };
@@ -71,14 +73,14 @@ struct Plan {
     const Mover* movers;
     const Edge* edges;
     const Face* faces;  ///< without faces too thin to have a normal
-    const Plane* planes;
     const Segment* segments;
     const Triangle* triangles;
-    int vertex_count, mover_count, edge_count, face_count, plane_count;
+    int vertex_count, mover_count, edge_count, face_count;
     int segment_count, triangle_count;
-    bool convex;  ///< planes test for the inside; otherwise rays do
+    bool convex;  ///< faces' heights test for the inside; otherwise rays do
+    bool beyond;  ///< every colour is taken for inside; not with convex
     bool solid;   ///< false for one or two colours and flat palettes: every colour is outside
-    T extent;     ///< diagonal of the bounding box
+    T size;       ///< diagonal of the bounding box, or the largest coordinate if that is more
     T steepness;  ///< estimate of the largest displacement per unit of length
     T spread;     ///< largest difference between two vertices' displacements, channel by channel
 };
@@ -88,14 +90,12 @@ struct Plan {
 /// values, aligned to 64 bytes. Each colour's result depends on that colour only.
 template <class T>
 struct Kernels {
-    /// Sets verdict: 1 inside, -1 outside, `at_surface` when closer to the surface than `shell`. It
-    /// is 0 when a non-convex body bends too close by to decide.
-    void (*classify)(const Plan<T>& plan, Block<T>& block, int count, T shell, T at_surface,
-                     T* scratch);
-    /// Mean value coordinates. verdict: 1 when the displacement is within `tolerance` of the exact
-    /// one, 0 when that is not guaranteed.
-    void (*mean_value)(const Plan<T>& plan, Block<T>& block, int count, T tolerance, T* scratch);
-    /// The closest point on the surface. verdict as for mean_value.
+    /// Mean value coordinates of colours inside a solid body. verdict: 1 when the displacement is
+    /// within `tolerance` of the exact one, 0 when that is not guaranteed, -1 outside. It is also 0
+    /// when a non-convex body bends too close by to decide, or its surface is closer than `shell`.
+    void (*inside)(const Plan<T>& plan, Block<T>& block, int count, T tolerance, T shell,
+                   T* scratch);
+    /// The closest point on the surface. verdict: 1 or 0.
     void (*closest)(const Plan<T>& plan, Block<T>& block, int count, T tolerance, T* scratch);
     /// Sets moved to the seen colour plus `strength` times moved, times alpha where premultiplied.
     /// Channels that do not move keep their bits, even a negative zero.
@@ -105,15 +105,19 @@ struct Kernels {
 /// Size of the scratch memory, enough for any instruction set.
 template <class T>
 int scratch_size(const Plan<T>& plan) {
-    constexpr int kMostLanes = 128 / static_cast<int>(sizeof(T));
-    const int mean_value = 8 * plan.vertex_count + 8 * plan.edge_count;
+    const int inside = 12 * plan.vertex_count + 3 * plan.edge_count + plan.face_count;
     const int closest = 2 * plan.segment_count + 3 * plan.triangle_count;
-    return kMostLanes * (mean_value > closest ? mean_value : closest);
+    return kStride<T> * (inside > closest ? inside : closest);
 }
 
 struct MvcKernels {
     Kernels<float> single;
     Kernels<double> twofold;
+    /// Takes `count` pixels of 3 or 4 channels apart: colours, alpha and, where premultiplied, what
+    /// is seen. False when some pixel is not recolourable().
+    bool (*read)(const float* in, int channels, int count, bool premultiplied, Block<float>& block);
+    /// Puts moved and alpha together again.
+    void (*write)(const Block<float>& block, int channels, int count, float* out);
 
     /// One for each instruction set in this build.
     static const MvcKernels& baseline();

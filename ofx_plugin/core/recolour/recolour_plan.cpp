@@ -7,15 +7,9 @@
 #include <utility>
 
 #include "model/vec3.hpp"
-#include "simd/split.hpp"
 
 namespace palette4d {
 namespace {
-
-template <class T>
-void split(const Vec3& from, T (&high)[3], T (&low)[3]) {
-    for (std::size_t c = 0; c < 3; ++c) palette4d::split(from[c], high[c], low[c]);
-}
 
 template <class T>
 void round(const Vec3& from, T (&to)[3]) {
@@ -38,18 +32,16 @@ template <class T>
 PlanMemory<T>::PlanMemory(const PaletteBody& body, const std::vector<Vec3>& displacement) {
     plan_.convex = body.convex();
     plan_.solid = !body.faces().empty() && !body.flat();
-    plan_.extent = static_cast<T>(body.extent());
 
     double size = body.extent();
     Vec3 low = displacement[0], high = displacement[0];
     for (std::size_t i = 0; i < body.rgb().size(); ++i) {
         const Vec3& colour = body.rgb()[i];
         typename Plan<T>::Vertex vertex;
-        split(colour, vertex.high, vertex.low);
+        round(colour, vertex.at);
         round(turned(colour - body.rgb()[0]), vertex.ray);
         size = std::max(size, largest(colour));
         const Vec3& delta = displacement[i];
-        round(delta, vertex.delta);
         vertices_.push_back(vertex);
         for (std::size_t c = 0; c < 3; ++c) {
             low[c] = std::min(low[c], delta[c]);
@@ -57,7 +49,7 @@ PlanMemory<T>::PlanMemory(const PaletteBody& body, const std::vector<Vec3>& disp
         }
         if (delta == Vec3{0, 0, 0}) continue;
         typename Plan<T>::Mover mover;
-        mover.vertex = i;
+        mover.vertex = i * Plan<T>::kVertex;
         round(delta, mover.delta);
         movers_.push_back(mover);
     }
@@ -65,6 +57,7 @@ PlanMemory<T>::PlanMemory(const PaletteBody& body, const std::vector<Vec3>& disp
         usable_ = true;
         return;
     }
+    plan_.size = static_cast<T>(size);
     plan_.spread = static_cast<T>(largest(high - low));
     // Leaves room, so that products of three lengths and of their inverses do not overflow.
     const double room = sizeof(T) == sizeof(float) ? 1e6 : 1e40;
@@ -77,14 +70,12 @@ PlanMemory<T>::PlanMemory(const PaletteBody& body, const std::vector<Vec3>& disp
     plan_.movers = movers_.data();
     plan_.edges = edges_.data();
     plan_.faces = faces_.data();
-    plan_.planes = planes_.data();
     plan_.segments = segments_.data();
     plan_.triangles = triangles_.data();
     plan_.vertex_count = static_cast<int>(vertices_.size());
     plan_.mover_count = static_cast<int>(movers_.size());
     plan_.edge_count = static_cast<int>(edges_.size());
     plan_.face_count = static_cast<int>(faces_.size());
-    plan_.plane_count = static_cast<int>(planes_.size());
     plan_.segment_count = static_cast<int>(segments_.size());
     plan_.triangle_count = static_cast<int>(triangles_.size());
 }
@@ -93,8 +84,8 @@ template <class T>
 void PlanMemory<T>::add_inside(const PaletteBody& body) {
     std::map<std::pair<std::size_t, std::size_t>, std::size_t> edge_of;
     const auto edge = [&](std::size_t a, std::size_t b) {
-        const auto [at, added] = edge_of.insert({{a, b}, edges_.size()});
-        if (added) edges_.push_back({a, b});
+        const auto [at, added] = edge_of.insert({{a, b}, edges_.size() * Plan<T>::kEdge});
+        if (added) edges_.push_back({a * Plan<T>::kVertex, b * Plan<T>::kVertex});
         return at->second;
     };
     for (std::size_t f = 0; f < body.faces().size(); ++f) {
@@ -106,23 +97,20 @@ void PlanMemory<T>::add_inside(const PaletteBody& body) {
                    k = static_cast<std::size_t>(corners[2]);
         const Vec3 &a = body.rgb()[i], &b = body.rgb()[j], &c = body.rgb()[k];
         typename Plan<T>::Face face;
-        face.i = i;
-        face.j = j;
-        face.k = k;
+        face.i = i * Plan<T>::kVertex;
+        face.j = j * Plan<T>::kVertex;
+        face.k = k * Plan<T>::kVertex;
         face.jk = edge(j, k);
         face.ik = edge(i, k);
         face.ij = edge(i, j);
         const Vec3 normal = cross(b - a, c - a);
         const bool same_way = dot(normal, body.normal(f)) > 0;
-        face.sign = static_cast<T>(same_way ? 1 : -1);
+        round(norm(normal) * body.normal(f), face.area);
+        face.twice_area = static_cast<T>(norm(normal));
         const Vec3 up = turned((1 / norm(normal)) * normal);
         round(up[2] < 0 ? -1 * up : up, face.ray_normal);
         face.ray_sign = static_cast<T>((up[2] < 0) == same_way ? -1 : 1);
         faces_.push_back(face);
-        typename Plan<T>::Plane plane;
-        round(body.normal(f), plane.normal);
-        plane.offset = static_cast<T>(dot(body.normal(f), a - body.rgb()[0]));
-        planes_.push_back(plane);
         double width = 0;
         for (const Vec3& colour : body.rgb()) {
             width = std::max(width, std::abs(dot(body.normal(f), colour - a)));
@@ -148,7 +136,7 @@ void PlanMemory<T>::add_surface(const PaletteBody& body, const std::vector<Vec3>
         const Vec3 change_j = displacement[face[1]] - delta,
                    change_k = displacement[face[2]] - delta;
         typename Plan<T>::Triangle triangle;
-        split(start, triangle.high, triangle.low);
+        round(start, triangle.start);
         round(std::sqrt(scale) * normal, triangle.normal);
         round(gradient_j, triangle.gradient_j);
         round(gradient_k, triangle.gradient_k);
@@ -166,7 +154,7 @@ void PlanMemory<T>::add_surface(const PaletteBody& body, const std::vector<Vec3>
         const double length2 = dot(along, along);
         const double inverse = length2 > 0 ? 1 / length2 : 0.0;
         typename Plan<T>::Segment segment;
-        split(body.rgb()[a], segment.high, segment.low);
+        round(body.rgb()[a], segment.start);
         round(along, segment.along);
         segment.inverse_length2 = static_cast<T>(inverse);
         round(displacement[a], segment.delta);

@@ -31,7 +31,6 @@ private:
     std::vector<typename Plan<T>::Mover> movers_;
     std::vector<typename Plan<T>::Edge> edges_;
     std::vector<typename Plan<T>::Face> faces_;
-    std::vector<typename Plan<T>::Plane> planes_;
     std::vector<typename Plan<T>::Segment> segments_;
     std::vector<typename Plan<T>::Triangle> triangles_;
     Plan<T> plan_{};
