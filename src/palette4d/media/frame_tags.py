@@ -19,6 +19,7 @@ def of_movie(clip: Clip, frame: int) -> Metadata:
     rate = (clip.rate.numerator, clip.rate.denominator)
     found: list[tuple[str, Any, Any]] = [
         ("FramesPerSecond", oiio.TypeDesc("rational"), rate),
+        ("dpx:FrameRate", "float", float(clip.rate)),
         ("PixelAspectRatio", "float", float(stated.pixel_aspect)),
         *of_colours(clip),
     ]

@@ -1,4 +1,7 @@
-"""Sound of a movie, copied to the movie that is made of it: packets, without decoding them."""
+"""Sound of a movie, copied to the movie that is made of it: packets, without decoding them.
+
+PCM becomes AAC in .mp4, where few programs read it.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,8 @@ import av
 from av.error import FFmpegError
 
 from palette4d.media.clip_movie import MovieClip, opened_movie
+
+_LAYOUTS = {1: "mono", 2: "stereo", 6: "5.1", 8: "7.1"}
 
 
 @dataclass(frozen=True)
@@ -46,6 +51,8 @@ class Sound:
                     continue  # timecode is written anew
                 if one.type == "audio" and _fits(one, extension):
                     streams.append(one.index)
+                    if _encoded(one, extension):
+                        notes.append("sound in PCM becomes AAC in .mp4; .mov keeps it as it is")
                 elif one.type == "audio":
                     name = one.codec_context.name
                     notes.append(f"sound in {name} is not copied: .{extension} cannot hold it")
@@ -53,9 +60,11 @@ class Sound:
                     notes.append(f"a stream of {one.type} is not copied")
         if streams and (clip.step != 1 or clip.stamps is None or clip.varies):
             why = "the frame rate varies" if clip.varies else "frames are left out"
-            return cls(clip.path, notes=(*notes, f"sound is not copied, because {why}"))
+            return cls(
+                clip.path, notes=(*dict.fromkeys(notes), f"sound is not copied, because {why}")
+            )
         if not streams:
-            return cls(clip.path, notes=tuple(notes))
+            return cls(clip.path, notes=tuple(dict.fromkeys(notes)))
         first, last = clip.frames[0], clip.frames[-1]
         return cls(
             clip.path,
@@ -63,7 +72,7 @@ class Sound:
             clip.time(first),
             None if first == 0 else clip.time(first),
             None if last == clip.count - 1 else clip.time(last) + 1 / clip.rate,
-            tuple(notes),
+            tuple(dict.fromkeys(notes)),
         )
 
     @contextlib.contextmanager
@@ -71,16 +80,35 @@ class Sound:
         """Add the streams to a movie that is written; yields what copies their packets."""
         with opened_movie(self.path) as source:
             chosen = [source.streams[index] for index in self.streams]
-            targets = {one.index: movie.add_stream_from_template(one) for one in chosen}
+            extension = "mp4" if "mp4" in movie.format.name else "mov"
+            targets = {one.index: _added(movie, one, extension) for one in chosen}
             packets = source.demux(chosen) if chosen else iter(())
-            yield Copier(self, targets, packets)
+            encoded = {one.index for one in chosen if _encoded(one, extension)}
+            yield Copier(self, targets, encoded, packets)
+
+
+def _encoded(stream: Any, extension: str) -> bool:
+    return extension == "mp4" and str(stream.codec_context.name).startswith("pcm_")
+
+
+def _added(movie: Any, stream: Any, extension: str) -> Any:
+    """Add a stream of sound to a movie, like another one."""
+    if not _encoded(stream, extension):
+        return movie.add_stream_from_template(stream)
+    context = stream.codec_context
+    count = context.layout.nb_channels
+    # Recorders often leave the places of channels open.
+    layout = _LAYOUTS.get(count, "") if "channels" in context.layout.name else context.layout.name
+    added = movie.add_stream("aac", rate=context.sample_rate, layout=layout)
+    added.bit_rate = 160_000 * max(1, count)
+    return added
 
 
 def _fits(stream: Any, extension: str) -> bool:
     """Whether a container holds a stream: FFmpeg says so when it writes the header."""
     try:
         with av.open(io.BytesIO(), "w", format=extension) as trial:
-            trial.add_stream_from_template(stream)
+            _added(trial, stream, extension)
             trial.start_encoding()
     except (FFmpegError, ValueError):
         return False
@@ -90,21 +118,33 @@ def _fits(stream: Any, extension: str) -> bool:
 class Copier:
     """Packets of sound, moved to the time of the new movie."""
 
-    def __init__(self, sound: Sound, targets: dict[int, Any], packets: Any) -> None:
+    def __init__(
+        self, sound: Sound, targets: dict[int, Any], encoded: set[int], packets: Any
+    ) -> None:
         self._sound, self._targets, self._packets = sound, targets, packets
+        self._encoded = encoded
         self._held: Any = None
 
     def until(self, time: Fraction | None = None) -> Sequence[Any]:
         """Return the packets before a time of the new movie, or all that are left."""
-        found = []
+        found: list[Any] = []
         while (packet := self._next()) is not None:
             at = packet.pts * packet.time_base
             if time is not None and at >= time:
                 self._held = packet
                 break
-            packet.stream = self._targets[packet.stream_index]
-            found.append(packet)
+            found += self._written(packet)
+        if time is None:
+            for index in self._encoded:
+                found += self._targets[index].encode(None)
         return found
+
+    def _written(self, packet: Any) -> Sequence[Any]:
+        target = self._targets[packet.stream_index]
+        if packet.stream_index in self._encoded:
+            return [one for sound in packet.decode() for one in target.encode(sound)]
+        packet.stream = target
+        return [packet]
 
     def _next(self) -> Any:
         if self._held is not None:
