@@ -19,9 +19,6 @@ from palette4d.analysis.losses import EVALUATIONS, palette_loss, refine_palette
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette
 
-# Relative tolerance of losses: below it a frame keeps its neighbour's palette without refinement.
-SAME = 1e-3
-
 
 @dataclasses.dataclass(frozen=True)
 class Block:
@@ -117,14 +114,9 @@ class Merge:
         colours = self.frames[first + (index if self.forwards else count - 1 - index)].coarse
         end = -1 if self.forwards else 0
         previous = self.palettes[-1] if index else self.keep.palettes[end]
-        fitted = self.losses[-1] if index else self.keep.losses[end]
-        loss = palette_loss(colours, previous.rgb, self.options)
-        if abs(loss - fitted) > SAME * fitted:
-            rgb = refine_palette(colours, previous, self.gamut, self.options, EVALUATIONS)
-            previous = FramePalette(rgb, previous.faces)
-            loss = palette_loss(colours, rgb, self.options)
-        self.palettes.append(previous)
-        self.losses.append(loss)
+        rgb = refine_palette(colours, previous, self.gamut, self.options, EVALUATIONS)
+        self.palettes.append(FramePalette(rgb, previous.faces))
+        self.losses.append(palette_loss(colours, rgb, self.options))
         self.change = self.theta * (self.kept + sum(self.losses)) - self.before
 
     def finish(self) -> Block:

@@ -49,9 +49,10 @@ USUAL_COST = USUAL.handle_cost
 PATIENCE = 0.08
 # Factor of `handle_cost` in the stopping test, for higher costs and for fewer vertices.
 DEARER = 4
-# Final selection, in rounds: the gradient steps, and the relative tolerance of the price within
-# which candidates take part. The last round measures all frames.
-ROUNDS = ((0, 0.5), (5, 0.05), (30, 0.02))
+# Gradient steps of the rounds of the final selection: on all candidates, on those within `PATIENCE`
+# of the least price, and, on all frames, on those within a quarter of it: rare handles are counted
+# after that. More steps rank better and take longer.
+ROUNDS = (0, 5, 30)
 # Most candidates with the same numbers of handles and colours in a round.
 OF_A_KIND = 2
 # Relative tolerance of equal prices, and least gain that justifies another insertion of stops: the
@@ -127,7 +128,8 @@ def best_of(
     palettes = [palette for palette, _ in candidates]
     cost = options.handle_cost
     close = [candidate for candidate in candidates if allowed(candidate[0], palettes, options)]
-    for (steps, tolerance), measured in zip(ROUNDS, (key, key, frames), strict=True):
+    rounds = zip(ROUNDS, (math.inf, PATIENCE, PATIENCE / 4), (key, key, frames), strict=True)
+    for steps, tolerance, measured in rounds:
         close = [
             (Priced(*refine_jointly(p.polytope, measured, gamut, options, steps, True)), start)
             for p, start in _close(close, cost, tolerance)

@@ -18,6 +18,7 @@ from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
 from palette4d.analysis.vertex_removal import NEGLIGIBLE, RemovalTrials
 
+# Most evaluations of the loss (NLopt) when one vertex moves, and when all vertices move together.
 LOCAL_EVALUATIONS = 40
 JOINT_EVALUATIONS = 150
 

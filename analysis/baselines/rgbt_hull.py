@@ -54,14 +54,16 @@ I64 = NDArray[np.int64]
 Cut = tuple[int, ...]
 """A part of the hull that a slice cuts: a vertex (v,), or an edge (u, w), u earlier than w."""
 
+# Default cap on the 4D vertices, and the fewest that enclose a volume at either end of the clip.
 VERTICES = 20
 LEAST_VERTICES = 2 * LEAST_COLOURS
-# The convex hull is recomputed when this share of the vertices is left.
+# Share of the vertices at which the convex hull is recomputed.
 ROUND = 0.8
 # How far beyond the gamut a new vertex may lie, in units of the gamut, before it is clipped.
 OVERSHOOT = 0.3
+# Tolerance of colours without extent on an axis, in units of the gamut: rounding.
 EXACTLY_FLAT = 1e-9
-# If qhull cannot separate the facets of a hull, its colours are moved by this much.
+# Noise in units of the gamut, tried in turn until qhull separates the facets of a hull.
 JITTERS = (0.0, 1e-9, 1e-7, 1e-5)
 
 

@@ -15,7 +15,7 @@ from palette4d.analysis.losses import loss_weights
 from palette4d.analysis.objective import Objective, loss_of
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Section, SkewPolytope
-from palette4d.analysis.stop_insertion import insert_stops
+from palette4d.analysis.stop_insertion import _Misfit, insert_stops
 
 from palette4d import _core
 from palette4d.media.clip import open_clip
@@ -169,6 +169,13 @@ def test_highlights_in_a_real_clip_are_kept(seasons, numbers, lit, lights):
     analysis = pipeline.find_polytope(frames, AnalysisOptions())
     assert analysis.stages[-1].losses.max_distance < 0.3
     assert analysis.stages[-1].losses.L_prime < analysis.stages[0].losses.L_prime
+
+
+@pytest.mark.parametrize(("left", "enough"), [(0.049, True), (0.051, False)])
+def test_a_stop_brings_back_half_of_the_lost_pixels(left, enough):
+    lost = _Misfit(far=np.array([1.0]), lost=np.array([0.1]))
+    with_a_stop = _Misfit(far=np.array([0.5]), lost=np.array([left]))
+    assert lost.removed(0, with_a_stop, 0, share=0.1) is enough
 
 
 def test_frames_that_fit_alike_get_none():
