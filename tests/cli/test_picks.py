@@ -310,7 +310,7 @@ def test_another_clip_is_refused(path: str, run: Run, tmp_path: Path) -> None:
         assert "another clip" in errors
 
 
-def test_another_clip_of_the_same_size_is_told(run: Run, tmp_path: Path) -> None:
+def test_another_clip_of_the_same_size_is_told(run: Run, path: str, tmp_path: Path) -> None:
     for frame in range(FRAMES):
         pixels = np.rint(picture(frame)[::-1, :, ::-1] * 255).astype(np.uint8)
         write_image(tmp_path / f"clip.{frame:04d}.png", pixels)
@@ -318,6 +318,9 @@ def test_another_clip_of_the_same_size_is_told(run: Run, tmp_path: Path) -> None
     assert "another clip" not in run(*words)[2]
     _, _, errors = run(*words, "--clip", str(tmp_path / "clip.####.png"))
     assert "another clip, give the analysed one as --clip" in errors
+    document = Document.load(path)
+    (told, *_) = document.pick_warnings("p2", str(tmp_path / "clip.####.png"))
+    assert "give the analysed one as clip=…" in told
 
 
 def test_a_colour_that_no_pixel_has_is_told(run: Run) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import ast
 import inspect
 import pickle
 import re
@@ -75,10 +76,23 @@ def test_the_command_line_says_the_options_of_the_verb(verb: str, arg: Arg, opti
     assert option_of(arg, parser) == option
 
 
-def test_messages_name_arguments_that_the_api_has() -> None:
+def sources() -> list[Path]:
     root = Path(palette4d.__file__).parent
     folders = (root, Path(analysis.__file__).parent, Path(lut_export.__file__).parent)
-    texts = [path.read_text("utf-8") for folder in folders for path in folder.rglob("*.py")]
+    return [path for folder in folders for path in folder.rglob("*.py")]
+
+
+def test_no_message_spells_an_argument_out() -> None:
+    for path in sources():
+        tree = ast.parse(path.read_text("utf-8"))
+        docs = {each.value for each in ast.walk(tree) if isinstance(each, ast.Expr)}
+        for each in ast.walk(tree):
+            if isinstance(each, ast.Constant) and isinstance(each.value, str) and each not in docs:
+                assert not re.search(r"\b[a-z_]+=(…|True\b)", each.value), f"{path}:{each.lineno}"
+
+
+def test_messages_name_arguments_that_the_api_has() -> None:
+    texts = [path.read_text("utf-8") for path in sources()]
     named = {name for text in texts for name in re.findall(r"\bArg\([\"'](\w+)[\"']", text)}
     calls = [getattr(palette4d, name) for name in palette4d.__all__ if name != "__version__"]
     calls += [call for name, call in inspect.getmembers(palette4d.Document, inspect.isroutine)]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from palette4d.cli.lut_options import add_lut_options, lut_settings, wide_help
 from palette4d.cli.terminal import tell
 from palette4d.common.arguments import number
-from palette4d.common.errors import WriteError
+from palette4d.common.errors import Arg, WriteError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -162,9 +162,9 @@ def warnings(result: BakeResult, format_: LutFormat) -> Iterator[str]:
     beyond = clip.outside_domain > 0 if clip else low < shaper.low or high > shaper.high
     if beyond and result.cdl is None:
         if shaper.kind != "none":
-            help_ = "widen it with domain=…"
+            help_ = f"widen it with {Arg('domain')}"
         elif format_.shaper:
-            help_ = 'shaper="auto" covers them'
+            help_ = f"{Arg('shaper', 'auto')} covers them"
         else:
             help_ = f"{with_shaper()} can hold a shaper that covers them"
         what = f"the palette, from {low:g} to {high:g}, is partly"

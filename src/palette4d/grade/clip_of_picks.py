@@ -234,7 +234,7 @@ class ClipOfPicks:
                 f"no pixel of frame {frame} is near the colour of {pick.id}: the nearest one, "
                 f"{hex_of(rgb[away.argmin()])}, is {away.min():.2f} away"
             )
-        return tuple(told)
+        return tuple(map(Message, told))
 
     def path(self, pick: Pick, progress: Progress | None = None) -> tuple[PathKey, ...]:
         """Return the path of a pick from its own colour and the given keys of its path.

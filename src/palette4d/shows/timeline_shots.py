@@ -134,7 +134,7 @@ class _Finder:
         if find_media.is_elsewhere(clip.url or ""):
             raise Palette4dError(
                 f"found the media {clip.url!r} of another computer, expected a file of this one; "
-                "relink it, or name the folder that holds it with media=…"
+                f"relink it, or name the folder that holds it with {Arg('media')}"
             )
         if named and (spec := find_media.as_clip(self.path.parent / named)) is not None:
             return spec
