@@ -400,3 +400,26 @@ def test_hdr10_is_kept_by_hevc(tmp_path):
     assert open_clip(str(tmp_path / "o.mp4")).stated.hdr10 == expected
     done = render(source, tmp_path / "o.mov")
     assert any("HDR10" in note for note in done.notes)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rate", RATES, ids=str)
+@pytest.mark.parametrize(("name", "codec"), OUTPUTS)
+def test_formats_by_tags_by_rates(tmp_path, rate, name, codec):
+    """The whole matrix; the tests above take its rows and columns."""
+    for tags in TAGS:
+        source = movie(
+            tmp_path / "s.mov",
+            list(tiles(3)),
+            tags=tags,
+            rate=rate,
+            aspect=Fraction(4, 3),
+            sound="pcm_s16le",
+            metadata={"timecode": "10:00:00:00"},
+        )
+        render(source, tmp_path / name, codec=codec)
+        found = said(tmp_path / name)
+        assert (found.rate, found.aspect, found.sound) == (rate, Fraction(4, 3), 1)
+        assert found.timecode == "10:00:00:00"
+        if not (codec.startswith("dnx") and 2 in tags[:2]):
+            assert (found.primaries, found.transfer) == words(*tags)[:2]
