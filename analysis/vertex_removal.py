@@ -7,6 +7,7 @@ then removes vertices one by one. The paper's own rule is in `baselines.paper_th
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Sequence
 
 import numpy as np
@@ -23,6 +24,8 @@ F64 = NDArray[np.float64]
 NEGLIGIBLE = 1e-3
 # Threshold of `thin_out`, as a multiple of the first loss; the structure search goes on from there.
 THINNED = 1.6
+# RGB tolerance for straight paths: a colour's distance from the line between two vertices.
+STRAIGHT = 0.08
 
 
 class RemovalTrials:
@@ -71,11 +74,13 @@ def thin_out(
 ) -> F64:
     """Remove vertices until the loss is `THINNED` times its first value; return it for each frame.
 
-    Each round tries all vertices and removes the cheapest, a quarter of them at most, no two of
-    them neighbours in time.
+    The first to go are vertices on straight paths. Then each round tries all vertices and removes
+    the cheapest, a quarter of them at most, no two of them neighbours in time.
     """
+    first = RemovalTrials(dense, frames, options).losses
+    threshold = THINNED * float(first.sum()) + NEGLIGIBLE * len(first)
+    _straighten(dense)
     trials = RemovalTrials(dense, frames, options)
-    threshold = THINNED * float(trials.losses.sum()) + NEGLIGIBLE * len(frames)
     pool = [v for v in range(len(dense.place)) if dense.removable(v)]
     while pool:
         total = float(trials.losses.sum())
@@ -98,3 +103,27 @@ def thin_out(
             break
         pool = [v for v in pool if dense.removable(v)]
     return trials.losses
+
+
+def _straighten(dense: DensePolytope) -> None:
+    """Remove vertices, the straightest path first, while ghosts stay near their first colours."""
+    original = [rgb.copy() for rgb in dense.position]
+
+    def bend(vertex: int) -> float:
+        return max(
+            float(np.linalg.norm(rgb - original[i][s])) for i, s, rgb in dense.ghosts(vertex)
+        )
+
+    queue = [(bend(v), v) for v in range(len(dense.place)) if dense.removable(v)]
+    heapq.heapify(queue)
+    while queue:
+        cached, vertex = heapq.heappop(queue)
+        if cached > STRAIGHT:
+            break
+        if not dense.removable(vertex):
+            continue
+        now = bend(vertex)  # it grows as neighbours go
+        if now > cached:
+            heapq.heappush(queue, (now, vertex))
+            continue
+        dense.remove(vertex)
