@@ -21,7 +21,7 @@ from av.filter import Graph
 from numpy.typing import NDArray
 
 from palette4d.common.files import replacing
-from palette4d.common.message import Arg
+from palette4d.common.message import Arg, Message
 from palette4d.media.clip_base import F32, strips
 from palette4d.media.codecs import Codec, codec_for
 from palette4d.media.colour_tags import LUMA_WEIGHTS, UNKNOWN
@@ -75,14 +75,14 @@ class Delivery:
         chosen = codec_for(path, codec, stated.tags.transfer)
         if crf is not None and "crf" not in chosen.options:
             raise OutputError(
-                f"output {path}: found crf={crf} for {chosen.name}, expected it for h264 and hevc "
-                f"alone; choose {Arg('codec')}"
+                f"output {path}: found {Arg('crf', crf)} for {chosen.name}, expected it for h264 "
+                f"and hevc alone; choose {Arg('codec')}"
             )
         if stated.fields and not chosen.interlaced:
             raise OutputError(
                 f"output {path}: found an interlaced clip for {chosen.name}, which holds "
-                "progressive pictures alone; choose codec=prores422hq or h264, or deinterlace "
-                "the clip first"
+                f"progressive pictures alone; choose {Arg('codec', 'prores422hq')} or h264, or "
+                "deinterlace the clip first"
             )
         tags = stated.tags.for_luma_chroma()
         notes = []
@@ -100,19 +100,19 @@ class Delivery:
         if stated.hdr10 and "x265-params" not in chosen.options:
             notes.append(
                 f"the mastering display and the light levels of HDR10 are not kept: {chosen.name} "
-                "does not hold them; codec=hevc does"
+                f"does not hold them; {Arg('codec', 'hevc')} does"
             )
         if alpha and not chosen.alpha_layout:
             notes.append(
                 "the movie has no alpha, the picture is laid over black; frames and "
-                "codec=prores4444 keep it"
+                f"{Arg('codec', 'prores4444')} keep it"
             )
         return cls(
             chosen,
             dataclasses.replace(stated, tags=tags),
             alpha and bool(chosen.alpha_layout),
             crf,
-            tuple(notes),
+            tuple(map(Message, notes)),
         )
 
     @property
