@@ -13,7 +13,7 @@ TEST(node_describes_itself) {
     CHECK(plugin.ofx().pluginApi == std::string(kOfxImageEffectPluginApi));
     CHECK(plugin.ofx().apiVersion == 1);
     CHECK(plugin.ofx().pluginIdentifier == std::string("org.palette4d.Palette4D"));
-    CHECK(plugin.ofx().pluginVersionMajor == 1 && plugin.ofx().pluginVersionMinor == 5);
+    CHECK(plugin.ofx().pluginVersionMajor == 1 && plugin.ofx().pluginVersionMinor == 6);
     CHECK(plugin.load() == kOfxStatOK);
     for (const char* context : {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral,
                                 kOfxImageEffectContextPaint}) {
