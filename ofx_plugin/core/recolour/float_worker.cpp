@@ -169,14 +169,23 @@ private:
         void finish(Block<T>& block, int count) {
             if (add_picks_) {
                 add_picks_(picks_, block.colour, block.moved, count);
-                for (int i = 0; sizeof(T) == sizeof(float) && i < count; ++i) {
-                    const T size = std::max(
-                        std::abs(block.colour[0][i]),
-                        std::max(std::abs(block.colour[1][i]), std::abs(block.colour[2][i])));
-                    if (!(size <= kLargestPicked) && block.verdict[i] > 0) block.verdict[i] = 0;
-                }
+                if (sizeof(T) == sizeof(float)) leave_large(block, count);
             }
             kernels_.move(block, count, strength_, divide_);
+        }
+
+        /// Leaves colours that are too large for picks to the next stage.
+        static void leave_large(Block<T>& block, int count) {
+            const auto fits = [&](int i) {  // not NaN
+                return (std::abs(block.colour[0][i]) <= kLargestPicked) &
+                       (std::abs(block.colour[1][i]) <= kLargestPicked) &
+                       (std::abs(block.colour[2][i]) <= kLargestPicked);
+            };
+            int fitting = 0;
+            for (int i = 0; i < count; ++i) fitting += fits(i);
+            for (int i = 0; fitting < count && i < count; ++i) {
+                if (!fits(i) && block.verdict[i] > 0) block.verdict[i] = 0;
+            }
         }
 
         void sort() {
