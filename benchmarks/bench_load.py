@@ -71,7 +71,7 @@ def extra(source: Path, folder: Path, count: int) -> None:
     document["extra"] = {"other": [0] * count}
     (folder / "extra.p4d.json").write_text(json.dumps(document), "utf-8")
     edited = Document.load(folder / "extra.p4d.json")
-    edited.set(edited.core.polytope.vertex_ids[0], rgb=(1, 0, 0))
+    edited.set(edited.grade.core.polytope.vertex_ids[0], rgb=(1, 0, 0))
     edited.save()
 
 
@@ -81,7 +81,7 @@ def edits(source: Path, folder: Path, count: int) -> None:
     path.write_bytes(source.read_bytes())
     for i in range(count):
         edited = Document.load(path)
-        edited.set(edited.core.polytope.vertex_ids[0], rgb=(i / count, 0, 0))
+        edited.set(edited.grade.core.polytope.vertex_ids[0], rgb=(i / count, 0, 0))
         edited.save()
 
 
@@ -99,9 +99,9 @@ def shots(source: Path, folder: Path, count: int) -> None:
 def frames(source: Path, folder: Path, count: int) -> None:
     """Every frame's palette of a long clip."""
     document = Document.load(source)
-    first, last, _ = document.frames
+    first, last, _ = document.grade.frames
     for i in range(count):
-        document.palette(first + (last - first) * i / count)
+        document.grade.palette(first + (last - first) * i / count)
 
 
 def main() -> None:

@@ -62,7 +62,7 @@ def stretched(sidecar: Path, clip: str, out: Path) -> Path:
     """Write the sidecar, without edits, with its times stretched to another clip's frames."""
     document = Document.load(sidecar)
     document.reset()
-    for name in document.versions:
+    for name in document.grade.versions:
         document.remove_version(name)
     document.forget_history()
     fields = document.fields()
@@ -158,7 +158,7 @@ class Bench:
         """Drag a colour; yield the seconds of each step."""
         document = self.session.document
         assert document is not None
-        palette = document.palette(self.session.frame)
+        palette = document.grade.palette(self.session.frame)
         id_ = palette.ends[int(np.argmax(np.asarray(palette.rgb).sum(axis=1)))][0]
         rng = np.random.default_rng(3)
         for _ in range(times):

@@ -130,7 +130,7 @@ def shots() -> None:
         for k in range(3):
             frame = round(first + (last - first) * (k + 0.5) / 3)
             lower = show(axes, clip[order[frame]], left + 1.25 * k, 0.55, 1.22)
-            swatches(axes, doc.palette(frame).rgb, left + 1.25 * k, lower + 0.1, 1.22, 0.5)
+            swatches(axes, doc.grade.palette(frame).rgb, left + 1.25 * k, lower + 0.1, 1.22, 0.5)
         if at:
             axes.plot([left - 0.09] * 2, [0.2, 2.4], color=TEXT, lw=1, ls=(0, (2, 3)))
         write(axes, left + 1.85, 0.3, f"frames {first} to {last}", color=DIM)
@@ -165,7 +165,7 @@ def clips() -> None:
         for row, frame in enumerate((0, 6, 11)):
             top = 0.5 + 0.9 * row
             lower = show(axes, frames[frame], left, top, 1.45)
-            swatches(axes, doc.palette(frame).rgb, left + 1.5, top, 0.76, lower - top)
+            swatches(axes, doc.grade.palette(frame).rgb, left + 1.5, top, 0.76, lower - top)
     save(figure, "clips")
 
 
@@ -207,7 +207,7 @@ def linear() -> None:
                  color="#3d3d3d", align="edge", zorder=1)  # fmt: skip
         doc = p4d.analyze(frames, input_space=light, palette_space=space, vertices=20)
         own = np.array([vertex["rgb"] for vertex in doc.fields()["polytope"]["vertices"]])
-        found = converted(own, doc.encoding, light)
+        found = converted(own, doc.grade.encoding, light)
         most = np.maximum(found.max(axis=-1, keepdims=True), 0)
         colours = np.clip(converted(1.025 * found / (1 + most), light, display), 0, 1)
         level = np.linspace(0.2, 1.05, len(found))[np.argsort(np.argsort(own.sum(axis=1)) * 7 % 20)]
@@ -247,9 +247,9 @@ def calls() -> None:
     """A picture and what four methods of a document make of it."""
     doc = autumn()
     image = p4d.open_clip(CLIP).read(30)[..., :3]
-    near = doc.near((0.9, 0.42, 0.62), frame=30)
+    near = doc.grade.near((0.9, 0.42, 0.62), frame=30)
     matte = doc.matte(image, 30, f"weight:{near.handle or near.id}")
-    graded, palette = doc.recolour(image, 30), doc.palette(30)
+    graded, palette = doc.recolour(image, 30), doc.grade.palette(30)
     figure, axes = page(12, 3.45)
     for k, (text, picture) in enumerate(
         (

@@ -195,7 +195,7 @@ def draw_tools(demo: Path) -> None:
     sidecar, clip = demo / "sample.p4d.json", p4d.open_clip(str(demo / "clip/sample.####.png"))
     plain = p4d.load(sidecar)
     plain.reset()
-    gold = plain.near(GOLD, frame=TOOLS_AT).id
+    gold = plain.grade.near(GOLD, frame=TOOLS_AT).id
 
     def pick(document: p4d.Document) -> None:
         for wall, blue in ((WALL, "#3359b3"), (GABLE, "#24407f")):
@@ -212,7 +212,7 @@ def draw_tools(demo: Path) -> None:
     height, width = image.shape[:2]
     figure = Figure(figsize=(14, 14 * 2 * (height / width / 2 + 0.03)), facecolor=PAGE)
     for index, (title, tool) in enumerate(tools):
-        document = plain.trial()
+        document = p4d.Document(plain.grade)
         tool(document)
         axes = figure.add_subplot(2, 2, index + 1)
         axes.imshow(np.clip(document.recolour(image, TOOLS_AT), 0, 1), interpolation="bicubic")
@@ -233,7 +233,7 @@ def draw_picks() -> None:
     image = np.ascontiguousarray(clip.read(frame)[..., :3])
 
     def asked(*gestures: Gesture) -> p4d.Document:
-        document = plain.trial()
+        document = p4d.Document(plain.grade)
         for kind, place, box, to in gestures:
             if kind == "pick":
                 document.pick(frame, pixel=place, box=box, to=to, clip=path)
@@ -277,18 +277,18 @@ def draw_looks(demo: Path) -> None:
     sidecar, clip = demo / "sample.p4d.json", p4d.open_clip(str(demo / "clip/sample.####.png"))
     plain = p4d.load(sidecar)
     plain.reset()
-    gold = plain.near(GOLD, frame=TOOLS_AT).id
+    gold = plain.grade.near(GOLD, frame=TOOLS_AT).id
     edges = {edge["id"]: edge for edge in plain.fields()["polytope"]["edges"]}
     handle = edges[gold]["from"] if gold in edges else gold
-    warm = plain.trial()
+    warm = p4d.Document(plain.grade)
     warm.adjust(gold, track=True, hue=-35)
     warm.pick(frame=TOOLS_AT, colour=LAKE, by=(0.2, -0.05, -0.1), clip=clip.source)
-    cool = plain.trial()
+    cool = p4d.Document(plain.grade)
     cool.adjust(chroma=0.5)
     image = np.ascontiguousarray(clip.read(TOOLS_AT)[..., :3])
     shot = p4d.analyze(clip.source, frames=OTHER_SHOT)
     shot.copy_from(warm)
-    first, last, _ = shot.frames
+    first, last, _ = shot.grade.frames
     middle = (first + last) // 2
     other = np.ascontiguousarray(clip.read(middle)[..., :3])
     pictures = [
@@ -317,10 +317,10 @@ def draw_ramps() -> None:
     original = p4d.load(GOLDEN)
     at, amounts = (2, 4, 6, 8), (0.0, 0.45, 0.6, 0.0)
     for frame, amount in zip(at, amounts, strict=True):
-        colour = original.colour("e4", frame=frame)
+        colour = original.grade.colour("e4", frame=frame)
         document.stop("e4", frame=frame, rgb=(colour[0] + amount, *colour[1:]))
     frames = np.linspace(1, 9, 1601)[:-1]
-    before = np.array([original.colour("e4", frame=t) for t in frames])
+    before = np.array([original.grade.colour("e4", frame=t) for t in frames])
     figure = Figure(figsize=(14, 4.6), facecolor=PAGE)
     told = {
         "linear": "straight from handle to handle",
@@ -329,7 +329,7 @@ def draw_ramps() -> None:
     }
     for index, (ramp, words) in enumerate(told.items()):
         document.set_ramp(ramp)
-        after = np.array([document.colour("e4", frame=t) for t in frames])
+        after = np.array([document.grade.colour("e4", frame=t) for t in frames])
         moved = after[:, 0] - before[:, 0]
         axes = figure.add_subplot(1, 3, index + 1, facecolor=PANEL)
         for low, colours in ((0.94, before), (0.74, after)):

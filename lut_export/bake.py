@@ -282,8 +282,8 @@ def _opened(
     if not source.changed and source.path is not None and source.path.is_file():
         data = sidecars.read_bytes(source.path)
         if sidecars.decoded(data, str(source.path))[1] == fields:
-            return source.core, data, source.path
-    return source.core, sidecars.dumps(fields).encode("utf-8"), source.path
+            return source.grade.core, data, source.path
+    return source.grade.core, sidecars.dumps(fields).encode("utf-8"), source.path
 
 
 def check_target(path: Path, force: bool) -> None:

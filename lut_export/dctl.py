@@ -131,7 +131,7 @@ def export_dctl(
         raise Palette4dError(f"{output}: found no extension .dctl; name the file NAME.dctl")
     refuse_existing(output, force)
     sidecar = (
-        source.core
+        source.grade.core
         if isinstance(source, Document)
         else _core.parse_sidecar(sidecars.read_bytes(source), os.fspath(source))
     )

@@ -34,7 +34,8 @@ PUBLIC = {
     "render",
     "sample_clip",
 }
-GOLDEN = Path(__file__).resolve().parent / "golden" / "sidecars"
+ROOT = Path(__file__).resolve().parents[1]
+GOLDEN = ROOT / "tests" / "golden" / "sidecars"
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +49,14 @@ def clip_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         write_image(folder / f"shot.{i + 1:04d}.png", picture)
     write_movie(folder / "shot.mov", "png", "rgb24", codes[:13], "rgb24", rate=Fraction(24))
     return folder
+
+
+def test_a_document_has_few_members_all_of_them_on_the_page() -> None:
+    document = palette4d.load(GOLDEN / "v1_edited.p4d.json")
+    members = {name for name in dir(document) if not name.startswith("_")}
+    assert len(members) <= 40
+    page = (ROOT / "docs" / "python.md").read_text("utf-8")
+    assert {name for name in members if not re.search(rf"\.{name}\b", page)} == set()
 
 
 def test_only_these_names_are_public() -> None:
@@ -88,8 +97,8 @@ def test_every_line_of_the_page_runs(
     for block in code:
         exec(compile(block, "docs/python.md", "exec"), names)
     doc = names["doc"]
-    assert doc.palette(frame=30).edited.tolist() != doc.palette(frame=30).rgb.tolist()
-    assert doc.versions == ("before warm", "warm")
+    assert doc.grade.palette(frame=30).edited.tolist() != doc.grade.palette(frame=30).rgb.tolist()
+    assert doc.grade.versions == ("before warm", "warm")
     assert palette4d.load("shot.p4d.json").fields() == doc.fields()
     assert Path("autumn.cube").stat().st_size > 0
     for name in PUBLIC:
@@ -110,11 +119,11 @@ def test_the_palettes_of_files_and_of_arrays_hold_their_pixels(clip_folder: Path
     ours = palette4d.analyze(array, method="static", progress=progress)
     theirs = palette4d.analyze(clip_folder / "shot.####.png", frames=frames, method="static")
     assert told
-    assert ours.frames == (0, 7, 1)
-    assert theirs.frames == (1, 8, 1)
+    assert ours.grade.frames == (0, 7, 1)
+    assert theirs.grade.frames == (1, 8, 1)
     assert ours.path is None
     for doc, frame in ((ours, 3), (theirs, 4)):
-        rebuilt = doc.weights(array[3], frame) @ doc.palette(frame).rgb
+        rebuilt = doc.weights(array[3], frame) @ doc.grade.palette(frame).rgb
         assert np.abs(rebuilt - array[3]).mean() < 0.01
 
 

@@ -21,7 +21,7 @@ def busiest(window: Window) -> str:
     assert document is not None
     assert player is not None
     frame = window.session.frame
-    palette = document.palette(frame)
+    palette = document.grade.palette(frame)
     shares = document.weights(player.read(frame), frame).mean(axis=(0, 1))
     at = int(np.argmax(shares))
     return palette.ends[at][int(palette.weights[at] > 0.5)]

@@ -37,7 +37,7 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
 def test_a_palette_is_computed_once_for_all_tracks(monkeypatch: pytest.MonkeyPatch) -> None:
     document = Document.load(EDITED)
     frames: list[float] = []
-    palette_at = document.palette
+    palette_at = document.grade.palette
 
     def palette(frame: float) -> Palette:
         frames.append(frame)
@@ -90,8 +90,8 @@ def test_info_shows_tracks_first(path: Path, capsys: pytest.CaptureFixture[str])
     assert main.main(["info", str(path)]) == 0
     lines = capsys.readouterr().out.splitlines()
     start = next(i for i, line in enumerate(lines) if line.startswith("track "))
-    names = [line.split()[0] for line in lines[start + 1 : start + 1 + len(document.tracks)]]
-    assert names == [track.name for track in document.tracks]
+    names = [line.split()[0] for line in lines[start + 1 : start + 1 + len(document.grade.tracks)]]
+    assert names == [track.name for track in document.grade.tracks]
     assert len(lines) < start + len(names) + 6
     assert not any("deepest" in line or "K" in line.split() for line in lines)
     for name in names:

@@ -340,7 +340,7 @@ def test_history_says_what_changed(path: str, run: Run) -> None:
         ("--toward", "colour", "--whole-hue"),
     ):
         assert run("change", "p1", *words)[0] == 0
-    assert [step.label for step in Document.load(path).history[1:]] == [
+    assert [step.label for step in Document.load(path).history.done[1:]] == [
         "change p1: reach 1.5",
         "change p1: to #112233",
         "change p1: from frame 1 to 3, fades of 2 frames",

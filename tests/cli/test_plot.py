@@ -236,19 +236,19 @@ def test_close_discs_make_way_and_ids_do_not_overlap(blocks: int) -> None:
 @pytest.mark.parametrize("name", ["v1_split", "v1_merge", "v1_edited"])
 def test_polyhedra_and_rows_have_the_ids_of_tracks(name: str) -> None:
     document = Document.load(GOLDEN / f"{name}.p4d.json")
-    tracks = {t.name: {*t.vertices, *t.edges} for t in document.tracks}
+    tracks = {t.name: {*t.vertices, *t.edges} for t in document.grade.tracks}
     for frame in (0, 4.5, 9.5, 15, 20):
-        column = page.column(document.core, frame, None)
-        palette = document.palette(frame)
+        column = page.column(document.grade.core, frame, None)
+        palette = document.grade.palette(frame)
         assert len(set(column.ids)) == len(palette.ids)  # every disc has a label of its own
         for track, id_, rgb, shown in zip(
             column.ids, palette.ids, palette.rgb, column.shape.rgb, strict=True
         ):
             assert id_ in tracks[track]
             np.testing.assert_allclose(rgb, shown)
-    columns = [page.column(document.core, 4.5, None)]
+    columns = [page.column(document.grade.core, 4.5, None)]
     shares = {track: Share(0.25, 0.5, 4.0) for track in tracks}
-    figure = page.build(document.core, columns, shares=shares)
+    figure = page.build(document.grade.core, columns, shares=shares)
     texts = [text.get_text() for text in figure.axes[0].texts]
     for track in tracks:  # in its row, and where it is beside its disc
         assert any(track in text.split() for text in texts)

@@ -490,7 +490,7 @@ def test_show_writes_a_matte_as_a_grey_picture(tmp_path):
     pixels = colours(9, 13, 3)
     source = write_image(tmp_path / "c.0005.exr", pixels)
     document = Document.load(EDITED)
-    handle = document.core.polytope.vertex_ids[0]
+    handle = document.grade.core.polytope.vertex_ids[0]
     for show in (f"weight:{handle}", "outside"):
         words = ("--output", show, "--outside-at", 0.01, "--force")
         assert run(EDITED, source, "-o", tmp_path / "o.exr", *words) == 0

@@ -51,7 +51,7 @@ def autosave(path: Path) -> int:
         assert session.document
         copy = recovered(path)
         assert copy
-        assert Document.load(copy).settings == session.document.settings
+        assert Document.load(copy).grade.settings == session.document.grade.settings
         print(f"palette4d: error: {session.status.text}", file=sys.stderr)
     return 0 if session.saved else 1
 

@@ -28,7 +28,7 @@ def document(name: str) -> Document:
 
 def difference(before: Document, after: Document, frame: float) -> dict[str, Any]:
     """The displacement of each palette colour."""
-    one, two = before.palette(frame), after.palette(frame)
+    one, two = before.grade.palette(frame), after.grade.palette(frame)
     return dict(zip(one.ids, two.edited - one.edited, strict=True))
 
 
@@ -105,39 +105,39 @@ def test_a_track_follows_merges_backwards() -> None:
 
 def test_a_track_gets_a_colour() -> None:
     doc = document("split")
-    old = {id_: doc.colour(id_) for id_ in ("v4", "v8", "v12")}
+    old = {id_: doc.grade.colour(id_) for id_ in ("v4", "v8", "v12")}
     doc.adjust("v8", track=True, rgb="#3366cc")
-    new = doc.colour("v8")
+    new = doc.grade.colour("v8")
     assert new == (0.2, 0.4, 0.8)
     for id_, before in old.items():
-        shift = np.subtract(doc.colour(id_), before)
+        shift = np.subtract(doc.grade.colour(id_), before)
         share = min(1, luma(before) / luma(old["v8"]))
         assert shift == pytest.approx(share * np.subtract(new, old["v8"]), abs=1e-12)
     edge = document("split")
     edge.adjust("e4", track=True, frame=4.5, rgb=(0.5, 0.5, 0.5))
-    assert edge.colour("e4", frame=4.5) == pytest.approx((0.5, 0.5, 0.5))
+    assert edge.grade.colour("e4", frame=4.5) == pytest.approx((0.5, 0.5, 0.5))
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_palette_moves_as_a_whole(name: str) -> None:
     one, two = document(name), document(name)
     two.adjust(by=(0.1, -0.05, 0))
-    for frame in np.linspace(*one.frames[:2], 9).tolist():
+    for frame in np.linspace(*one.grade.frames[:2], 9).tolist():
         for delta in difference(one, two, frame).values():
             assert delta == pytest.approx([0.1, -0.05, 0], abs=1e-9)
-    assert len(two.history) == 1
+    assert len(two.history.done) == 1
     two.undo()
-    assert two.settings == one.settings
+    assert two.grade.settings == one.grade.settings
 
 
 def test_one_handle_and_an_edge() -> None:
     doc = document("edited")
     doc.adjust("v1", by=(0.1, 0, 0))
-    assert doc.colour("v1") == pytest.approx((0.2, 0.1, 0.1))
+    assert doc.grade.colour("v1") == pytest.approx((0.2, 0.1, 0.1))
     doc.adjust("s1", chroma=0)
-    assert np.ptp(doc.colour("s1")) < 1e-6
+    assert np.ptp(doc.grade.colour("s1")) < 1e-6
     (stop,) = doc.adjust("e1", frame=4.5, rgb=(0.3, 0.4, 0.5), ramp="hold")
-    assert (doc.colour(stop), doc.settings[stop].ramp) == ((0.3, 0.4, 0.5), "hold")
+    assert (doc.grade.colour(stop), doc.grade.settings[stop].ramp) == ((0.3, 0.4, 0.5), "hold")
     assert doc.adjust("e1", frame=4.5, rgb=(0.1, 0.4, 0.5)) == (stop,)
 
 
@@ -184,7 +184,7 @@ def test_refusals_change_nothing(id_: str | None, how: dict[str, Any]) -> None:
 @given(data=st.data())
 def test_nothing_changes_outside_of_a_range(data: st.DataObject) -> None:
     one = document(data.draw(st.sampled_from(("split", "merge"))))
-    first, last, _ = one.frames
+    first, last, _ = one.grade.frames
     two = Document(one.fields())
     start = data.draw(st.integers(first, last))
     until = data.draw(st.integers(start, last))
@@ -236,7 +236,7 @@ def test_a_range_fades_linearly_or_smoothly() -> None:
         one, two = document("split"), document("split")
         two.adjust("e1", track=True, by=[0.5, 0, 0], start=5, until=7, fade=4, ramp=ramp)
         found = [
-            (two.colour("e1", frame=t)[0] - one.colour("e1", frame=t)[0]) / 0.5
+            (two.grade.colour("e1", frame=t)[0] - one.grade.colour("e1", frame=t)[0]) / 0.5
             for t in (1, 2, 3, 4, 5)
         ]
         assert found == pytest.approx(expected, abs=1e-9)
@@ -244,11 +244,11 @@ def test_a_range_fades_linearly_or_smoothly() -> None:
 
 def test_near_within_a_range() -> None:
     one, two = document("split"), document("split")
-    seen = one.palette(4).rgb[1]
+    seen = one.grade.palette(4).rgb[1]
     near = two.set_near(seen, frame=4, rgb=(0.5, 0.5, 0.5), start=3, until=6, fade=2)
     assert near.handle is None
-    assert two.palette(4).edited[1] == pytest.approx((0.5, 0.5, 0.5))
-    assert len(two.history) == 1
+    assert two.grade.palette(4).edited[1] == pytest.approx((0.5, 0.5, 0.5))
+    assert len(two.history.done) == 1
     for frame in (0, 1, 8, 9, 12):
         assert not any(delta.any() for delta in difference(one, two, frame).values())
     assert two.set_near(seen, frame=0, by=(0.1, 0, 0)).handle == "v2"
@@ -264,7 +264,7 @@ def test_ramps_between_handles() -> None:
     base = document("split")
 
     def red(frame: float) -> float:
-        return doc.colour("e1", frame=frame)[0] - base.colour("e1", frame=frame)[0]
+        return doc.grade.colour("e1", frame=frame)[0] - base.grade.colour("e1", frame=frame)[0]
 
     low, high = red(2), red(4)
     assert red(3) == pytest.approx((low + high) / 2)
@@ -275,7 +275,7 @@ def test_ramps_between_handles() -> None:
     doc.undo()
     doc.undo()
     doc.set_ramp("hold")
-    assert doc.state[RAMP] == "hold"
+    assert doc.grade.state[RAMP] == "hold"
     assert red(3) == pytest.approx(low)
     doc.set_ramp("linear", a)
     assert red(3) == pytest.approx((low + high) / 2)
@@ -299,18 +299,18 @@ def test_ramps_are_saved(tmp_path: Path) -> None:
         "stops": [],
     }
     found = Document.load(tmp_path / "clip.p4d.json")
-    assert (found.ramp, found.settings) == ("smooth", doc.settings)
+    assert (found.grade.ramp, found.grade.settings) == ("smooth", doc.grade.settings)
 
 
 def test_every_vertex_and_edge_is_on_one_track() -> None:
     for name in NAMES:
         doc = document(name)
         polytope = doc.fields()["polytope"]
-        vertices = [id_ for track in doc.tracks for id_ in track.vertices]
-        edges = [id_ for track in doc.tracks for id_ in track.edges]
+        vertices = [id_ for track in doc.grade.tracks for id_ in track.vertices]
+        edges = [id_ for track in doc.grade.tracks for id_ in track.edges]
         assert sorted(vertices) == sorted(v["id"] for v in polytope["vertices"])
         assert sorted(edges) == sorted(e["id"] for e in polytope["edges"])
-        names = [track.name for track in doc.tracks]
+        names = [track.name for track in doc.grade.tracks]
         assert len(set(names)) == len(names)
 
 

@@ -44,7 +44,8 @@ def graded() -> Document:
 
 def worst(one: Document, other: Document, times: list[tuple[float, float]]) -> float:
     return max(
-        float(np.abs(one.palette(t).edited - other.palette(u).edited).max()) for t, u in times
+        float(np.abs(one.grade.palette(t).edited - other.grade.palette(u).edited).max())
+        for t, u in times
     )
 
 
@@ -57,7 +58,7 @@ def test_the_same_palette_gets_the_same_grade() -> None:
     assert fit.mean < 1 / 255
     assert fit.largest < 4 / 255
     assert fit.foreign == 0
-    assert len(target.settings) < 25
+    assert len(target.grade.settings) < 25
 
 
 def test_another_length_has_corresponding_times() -> None:
@@ -71,15 +72,15 @@ def test_a_target_of_very_many_frames_is_refused() -> None:
     target = Document(stretched(members("split"), 50_000_000, 0))
     with pytest.raises(Palette4dError, match="more than 1000000 frames"):
         target.copy_from(graded())
-    assert not target.settings
+    assert not target.grade.settings
 
 
 def test_one_frame_gives_its_look_to_all_frames() -> None:
     source, target = graded(), Document(members("split"))
     target.copy_from(source, time=2)
-    there = source.palette(2)
+    there = source.grade.palette(2)
     for frame in (0, 7, 15, 20):
-        palette = target.palette(frame)
+        palette = target.grade.palette(frame)
         image = palette.rgb[None].astype(np.float32)
         expected = source.recolour(image, 2, space="palette")[0]
         assert palette.edited == pytest.approx(expected, abs=4 / 255)
@@ -90,9 +91,9 @@ def test_a_copy_is_one_step_and_loses_no_edits() -> None:
     source, target = graded(), Document(members("edited"))
     before = target.fields()["edits"]
     target.copy_from(source)
-    assert target.versions == ("before copy",)
+    assert target.grade.versions == ("before copy",)
     assert target.version("before copy").fields()["edits"] == before
-    assert len(target.history) == 1
+    assert len(target.history.done) == 1
     target.undo()
     assert target.fields()["edits"] == before
 
@@ -110,9 +111,9 @@ def test_colours_of_another_encoding_are_converted() -> None:
     back = between("ACEScct", "sRGB")
     assert back is not None
     for id_ in ("v1", "v12", "v4"):
-        assert back(target.colour(id_)) == pytest.approx(source.colour(id_), abs=0.01)
+        assert back(target.grade.colour(id_)) == pytest.approx(source.grade.colour(id_), abs=0.01)
     for id_ in ("v2", "v3"):
-        assert id_ not in target.settings
+        assert id_ not in target.grade.settings
 
 
 def test_encodings_that_cannot_be_converted_are_refused() -> None:
@@ -185,10 +186,10 @@ def test_a_new_analysis_with_another_palette_gets_the_grade(tmp_path: Path) -> N
     assert any("clip.former.p4d.json" in note for note in new.notes)
     found = Document.load(path)
     assert found.fields()["polytope"] == fields["polytope"]
-    assert found.versions == ("purple",)
-    assert found.settings
-    assert found.version("purple").settings != found.settings
-    assert len(found.history) == 1
+    assert found.grade.versions == ("purple",)
+    assert found.grade.settings
+    assert found.version("purple").grade.settings != found.grade.settings
+    assert len(found.history.done) == 1
     again = Document(members("split"))
     again.save(path, on_edits="keep")
     assert (tmp_path / "clip.former2.p4d.json").exists()
@@ -197,7 +198,7 @@ def test_a_new_analysis_with_another_palette_gets_the_grade(tmp_path: Path) -> N
 def test_edits_stay_with_the_same_handles(tmp_path: Path) -> None:
     path = tmp_path / "clip.p4d.json"
     document = Document(members("split"))
-    seen = document.palette(8).rgb.mean(axis=0).tolist()
+    seen = document.grade.palette(8).rgb.mean(axis=0).tolist()
     document.pick(frame=8, colour=seen, by=(0.2, 0, 0))
     document.save_version("picked")
     document.set("v1", rgb=(1, 0, 0))
@@ -212,9 +213,9 @@ def test_edits_stay_with_the_same_handles(tmp_path: Path) -> None:
     assert not new.notes
     found = Document.load(path)
     assert found.fields()["polytope"] == moved["polytope"]
-    assert found.settings == document.settings
-    assert found.history == document.history
-    assert found.picks == document.picks
+    assert found.grade.settings == document.grade.settings
+    assert found.history.done == document.history.done
+    assert found.grade.picks == document.grade.picks
     image = np.array(seen, dtype=np.float32)[None, None]
     for one in (found, found.version("picked")):
         assert one.recolour(image, 8)[0, 0] == pytest.approx(np.add(seen, (0.2, 0, 0)), abs=0.02)
@@ -251,13 +252,13 @@ def test_the_grade_is_copied_if_a_handle_moves_in_time_beyond_a_stop(tmp_path: P
 
 def test_picks_are_copied() -> None:
     source = Document(members("split"))
-    seen = source.palette(8).rgb.mean(axis=0).tolist()
+    seen = source.grade.palette(8).rgb.mean(axis=0).tolist()
     source.pick(frame=8, colour=seen, by=(0.2, 0, 0), follow=False, start=4, until=10, fade=2)
     target = Document(stretched(members("split"), 2, 100))
     fit = target.copy_from(source)
-    (pick,) = target.picks
+    (pick,) = target.grade.picks
     assert (pick.frame, pick.start, pick.until, pick.fade) == (116, 108, 120, 4)
-    assert not target.settings
+    assert not target.grade.settings
     image = np.array(seen, dtype=np.float32)[None, None]
     changed = target.recolour(image, 116)[0, 0] - image[0, 0]
     assert changed == pytest.approx([0.2, 0, 0], abs=0.02)
@@ -265,14 +266,14 @@ def test_picks_are_copied() -> None:
     back = Document(members("split"))
     target.change_pick(pick.id, frame=115, start=107)
     back.copy_from(target)
-    (copied,) = back.picks
+    (copied,) = back.grade.picks
     assert (copied.frame, copied.start, copied.until) == (8, 4, 10)  # frames of the clip
     assert fit.mean < 0.02
     target.unpick(pick.id)
-    assert not target.edited
+    assert not target.grade.edited
     still = Document(members("split"))
     still.copy_from(source, time=15)
-    assert not still.picks
+    assert not still.grade.picks
     still.copy_from(source, time=8)
-    (pick,) = still.picks
+    (pick,) = still.grade.picks
     assert (pick.start, pick.until) == (None, None)

@@ -56,10 +56,10 @@ def image(*shape: int, seed: int = 0) -> Any:
 def test_the_palette_is_the_cores(path: Path) -> None:
     document = Document.load(path)
     core = _core.read_sidecar(path)
-    first, last, _ = document.frames
+    first, last, _ = document.grade.frames
     for frame in np.linspace(first, last, 7).tolist():
         cut = _core.slice_at(core.polytope, frame)
-        palette = document.palette(frame)
+        palette = document.grade.palette(frame)
         assert palette.rgb.tolist() == cut.rgb.tolist()
         assert palette.edited.tolist() == (
             _core.edited_colours(core.polytope, core.edits, cut).tolist()
@@ -70,16 +70,18 @@ def test_the_palette_is_the_cores(path: Path) -> None:
 
 def test_ids_name_what_to_edit(edited: Path) -> None:
     document = Document.load(edited)
-    assert document.palette(0).ids == ("v1", "v2", "v3", "v4")
-    assert document.palette(3).ids == ("e1", "e2", "e3", "e4")
+    assert document.grade.palette(0).ids == ("v1", "v2", "v3", "v4")
+    assert document.grade.palette(3).ids == ("e1", "e2", "e3", "e4")
     for frame in (0, 3):
-        ids = document.palette(frame).ids
+        ids = document.grade.palette(frame).ids
         for i, id_ in enumerate(ids):
             if id_.startswith("v"):
                 document.set(id_, rgb=(i / 8, 0, 0))
             else:
                 document.stop(id_, frame=frame, rgb=(i / 8, 0, 0))
-        assert document.palette(frame).edited.tolist() == [[i / 8, 0, 0] for i in range(len(ids))]
+        assert document.grade.palette(frame).edited.tolist() == [
+            [i / 8, 0, 0] for i in range(len(ids))
+        ]
 
 
 @pytest.mark.parametrize(
@@ -91,13 +93,15 @@ def test_edited_colours_are_linear_between_handles(path: Path) -> None:
     frame_of = {vertex["id"]: vertex["frame"] for vertex in fields["polytope"]["vertices"]}
     for edge in fields["polytope"]["edges"]:
         handles = [(frame_of[edge[end]], edge[end]) for end in ("from", "to")]
-        handles += [(s.frame, id_) for id_, s in document.settings.items() if s.edge == edge["id"]]
+        handles += [
+            (s.frame, id_) for id_, s in document.grade.settings.items() if s.edge == edge["id"]
+        ]
         frames, colours = zip(
-            *((frame, document.colour(id_)) for frame, id_ in sorted(handles)), strict=True
+            *((frame, document.grade.colour(id_)) for frame, id_ in sorted(handles)), strict=True
         )
         for frame in np.linspace(frames[0], frames[-1], 7)[1:-1].tolist():
             expected = [np.interp(frame, frames, channel) for channel in zip(*colours, strict=True)]
-            found = document.colour(edge["id"], frame=frame)
+            found = document.grade.colour(edge["id"], frame=frame)
             assert found == pytest.approx(expected, abs=1e-12), (edge["id"], frame)
 
 
@@ -119,7 +123,7 @@ def test_undo_and_redo(edited: Path) -> None:
         act()
         states.append(document.fields()["edits"])
     assert states[-1] == {"vertices": [], "stops": []}
-    assert len(document.history) == 7
+    assert len(document.history.done) == 7
 
     def same(expected: dict[str, Any]) -> bool:
         found = document.fields()["edits"]
@@ -145,11 +149,11 @@ def test_undo_and_redo(edited: Path) -> None:
 
 def test_what_is_edited_is_seen_at_once(plain: Path) -> None:
     document = Document.load(plain)
-    document.palette(0)
+    document.grade.palette(0)
     document.set("v1", rgb=WHITE)
-    assert document.palette(0).edited[0].tolist() == [1, 1, 1]
+    assert document.grade.palette(0).edited[0].tolist() == [1, 1, 1]
     document.undo()
-    assert document.palette(0).edited.tolist() == document.palette(0).rgb.tolist()
+    assert document.grade.palette(0).edited.tolist() == document.grade.palette(0).rgb.tolist()
 
 
 @pytest.mark.parametrize(
@@ -170,9 +174,9 @@ def test_what_is_edited_is_seen_at_once(plain: Path) -> None:
         lambda d: d.shift("v4", by=(1e6, 0, 0)),
         lambda d: d.reset("v99"),
         lambda d: d.reset("e1"),
-        lambda d: d.near((0, 0, 0), frame=21),
+        lambda d: d.grade.near((0, 0, 0), frame=21),
         lambda d: d.set_near((1, 1, 1), frame=3, rgb=WHITE),
-        lambda d: d.palette(float("inf")),
+        lambda d: d.grade.palette(float("inf")),
         lambda d: d.save("missing/folder/clip.p4d.json"),
     ],
 )
@@ -182,7 +186,7 @@ def test_refusals_change_nothing(edited: Path, act: Any) -> None:
     with pytest.raises(Palette4dError):
         act(document)
     assert document.fields() == before
-    assert document.history == ()
+    assert document.history.done == ()
 
 
 # -------------------------------------------------------------------------------- what is seen
@@ -191,7 +195,7 @@ def test_refusals_change_nothing(edited: Path, act: Any) -> None:
 def test_the_edited_palette_is_matched(plain: Path) -> None:
     document = Document.load(plain)
     document.set("v2", rgb=(0.1, 0.9, 0.9))  # was red
-    near = document.near((0.1, 0.85, 0.9), frame=0)
+    near = document.grade.near((0.1, 0.85, 0.9), frame=0)
     assert (near.id, near.handle) == ("v2", "v2")
     assert near.rgb == (0.1, 0.9, 0.9)
     assert near.distance == pytest.approx(0.05)
@@ -204,49 +208,52 @@ def test_the_edited_palette_is_matched(plain: Path) -> None:
 def test_a_vertex_less_than_a_frame_away_is_the_handle(
     plain: Path, frame: float, handle: str | None
 ) -> None:
-    near = Document.load(plain).near((0.1, 0.1, 0.95), frame=frame)
+    near = Document.load(plain).grade.near((0.1, 0.1, 0.95), frame=frame)
     assert near.handle == handle
 
 
 def test_a_frame_step_is_that_of_the_clip(tmp_path: Path) -> None:
     document = Document.load(copy_of("step_two", tmp_path))
-    first, _, step = document.frames
+    first, _, step = document.grade.frames
     assert step == 2
-    wanted = document.palette(first).rgb[0]
-    assert document.near(wanted, frame=first + 1.9).handle == document.palette(first).ids[0]
-    assert document.near(wanted, frame=first + 2).handle is None
+    wanted = document.grade.palette(first).rgb[0]
+    assert (
+        document.grade.near(wanted, frame=first + 1.9).handle
+        == document.grade.palette(first).ids[0]
+    )
+    assert document.grade.near(wanted, frame=first + 2).handle is None
 
 
 @pytest.mark.parametrize("frame", [0, 3, 4.5, 9, 9.25, 15])
 @pytest.mark.parametrize("name", ["split", "edited"])
 def test_the_new_colour_is_hit_exactly(tmp_path: Path, name: str, frame: float) -> None:
     document = Document.load(copy_of(name, tmp_path))
-    for i in range(len(document.palette(frame).ids)):
-        seen = document.palette(frame).edited[i]
+    for i in range(len(document.grade.palette(frame).ids)):
+        seen = document.grade.palette(frame).edited[i]
         found = document.set_near(seen, frame=frame, rgb=(-2.0 - i, 0.25, 0.5))
         assert found.distance == 0
-        now = document.palette(frame).edited
+        now = document.grade.palette(frame).edited
         assert np.abs(now - [-2.0 - i, 0.25, 0.5]).max(axis=1).min() < 1e-12
-        assert found.handle in document.settings
+        assert found.handle in document.grade.settings
 
 
 def test_a_stop_beside_the_frame_does_not_spoil_the_hit(plain: Path) -> None:
     document = Document.load(plain)
-    seen = document.palette(0.25).edited[document.palette(0.25).ids.index("e1")]
+    seen = document.grade.palette(0.25).edited[document.grade.palette(0.25).ids.index("e1")]
     document.stop("e1", frame=0.3, rgb=seen)
     document.set_near(seen, frame=0.25, rgb=(0.1, 0.9, 0.4), anyway=True)
-    found = np.abs(document.palette(0.25).edited - [0.1, 0.9, 0.4]).max(axis=1)
+    found = np.abs(document.grade.palette(0.25).edited - [0.1, 0.9, 0.4]).max(axis=1)
     assert found.min() < 1e-12
 
 
 def test_a_colour_far_from_all_others_is_refused_with_what_it_is_made_of(plain: Path) -> None:
     document = Document.load(plain)
-    middle = document.palette(3).rgb[:2].mean(axis=0)
+    middle = document.grade.palette(3).rgb[:2].mean(axis=0)
     with pytest.raises(Palette4dError) as caught:
         document.set_near(middle, frame=3, rgb=WHITE)
     assert "50% e1" in str(caught.value)
     assert "50% e2" in str(caught.value)
-    shares = document.near(middle, frame=3).shares
+    shares = document.grade.near(middle, frame=3).shares
     assert dict(shares) == pytest.approx({"e1": 0.5, "e2": 0.5, "e3": 0, "e4": 0}, abs=1e-9)
     assert [share for _, share in shares] == sorted(dict(shares).values(), reverse=True)
     assert document.set_near(middle, frame=3, rgb=WHITE, anyway=True).handle == "s1"
@@ -268,12 +275,12 @@ def test_integers_are_no_code_values(plain: Path, rgb: Any, refused: bool) -> No
     document = Document.load(plain)
     fields = document.fields()
     fields["clip"]["encoding"] = "lin_rec709"
-    Document(fields).check_code_values(rgb)
+    Document(fields).grade.checked(rgb)
     if refused:
         with pytest.raises(Palette4dError):
-            document.check_code_values(rgb)
+            document.grade.checked(rgb)
     else:
-        document.check_code_values(rgb)
+        document.grade.checked(rgb)
 
 
 @pytest.mark.parametrize(
@@ -293,7 +300,7 @@ def test_integers_are_no_code_values(plain: Path, rgb: Any, refused: bool) -> No
 def test_linear_encodings_are_known_by_name(plain: Path, name: str, linear: bool) -> None:
     fields = Document.load(plain).fields()
     fields["clip"]["encoding"] = name
-    assert Document(fields).scene_linear == linear
+    assert Document(fields).grade.scene_linear == linear
 
 
 # ------------------------------------------------------------------------------------------ saving
@@ -331,7 +338,7 @@ def test_another_writers_edits_are_kept(edited: Path) -> None:
         ("s2", "e13", 9.25), ("s3", "e3", 7), ("s4", "e1", 3), ("s5", "e2", 3)
     }  # fmt: skip
     assert mine.fields()["edits"] == found
-    assert mine.palette(3).edited[1].tolist() == [1, 1, 1]
+    assert mine.grade.palette(3).edited[1].tolist() == [1, 1, 1]
     mine.undo()  # of the stop that has another id now
     mine.save()
     assert {stop["id"] for stop in edits_of(edited)["stops"]} == {"s2", "s3", "s4"}
@@ -346,9 +353,9 @@ def test_a_conflict_is_refused_and_both_keep_what_they_have(edited: Path) -> Non
     with pytest.raises(Palette4dError, match="v1"):
         mine.save()
     assert edited.read_bytes() == before
-    assert mine.colour("v1") == WHITE
+    assert mine.grade.colour("v1") == WHITE
     mine.save(edited.with_name("mine.p4d.json"))
-    assert Document.load(edited.with_name("mine.p4d.json")).colour("v1") == WHITE
+    assert Document.load(edited.with_name("mine.p4d.json")).grade.colour("v1") == WHITE
 
 
 def test_two_writers_share_one_history(edited: Path) -> None:
@@ -361,11 +368,11 @@ def test_two_writers_share_one_history(edited: Path) -> None:
     theirs.save()
     mine.set("v2", rgb=WHITE)
     mine.save()
-    assert mine.colour("v1") == (0, 0, 0)
-    assert len(mine.history) == 3
+    assert mine.grade.colour("v1") == (0, 0, 0)
+    assert len(mine.history.done) == 3
     mine.undo()
     mine.undo()
-    assert mine.colour("v1") == WHITE
+    assert mine.grade.colour("v1") == WHITE
     mine.undo()
     mine.save()
     assert edits_of(edited) == {**before, "stops": sorted(before["stops"], key=str)}
@@ -473,8 +480,8 @@ def test_edits_of_another_file_are_not_lost_unasked(plain: Path, tmp_path: Path)
     with pytest.raises(Palette4dError):
         document.save(target)
     document.save(target, on_edits="keep")
-    assert Document.load(target).settings == document.settings
-    assert len(document.settings) == 5
+    assert Document.load(target).grade.settings == document.grade.settings
+    assert len(document.grade.settings) == 5
     assert document.path == target
 
 
@@ -515,10 +522,10 @@ def test_without_edits_every_bit_stays(plain: Path) -> None:
 
 def test_a_clip_in_another_space_is_converted() -> None:
     document = Document.load(next(GOLDEN.glob("v*_scene_linear.p4d.json")))
-    conversion = document.core.conversion
+    conversion = document.grade.core.conversion
     assert conversion is not None
-    frame = document.frames[0]
-    document.set(document.palette(frame).ids[0], rgb=(0.5, 0.3, 0.3))
+    frame = document.grade.frames[0]
+    document.set(document.grade.palette(frame).ids[0], rgb=(0.5, 0.3, 0.3))
     pixels = image(8, 8, 3)
     there = conversion.steps.to_palette(pixels).astype(np.float32)
     expected = conversion.steps.to_clip(document.recolour(there, frame, space="palette"))
@@ -530,7 +537,7 @@ def test_a_clip_in_another_space_is_converted() -> None:
 
 def test_weights_reproduce_the_pixels(edited: Path) -> None:
     document = Document.load(edited)
-    palette = document.palette(3)
+    palette = document.grade.palette(3)
     shares = np.random.default_rng(1).dirichlet(np.ones(len(palette.ids)), (6, 7))
     pixels = (shares @ palette.rgb).astype(np.float32)
     weights = document.weights(pixels, 3)

@@ -1,26 +1,25 @@
 """Edits as values: applied, taken back, and merged with another writer's."""
 
 import json
+from typing import Any
 
 import pytest
 
 from palette4d.common.errors import Palette4dError
 from palette4d.grade.edits import (
-    MOST_STEPS,
     RAMP,
     Change,
     Edit,
     Setting,
     State,
     as_colour,
-    bounded,
     difference,
     folded,
     merged,
     new_id,
-    step_from_fields,
-    step_to_fields,
 )
+from palette4d.grade.members import MOST_STEPS, bounded, history_of, with_state
+from palette4d.grade.picks import PathKey, Pick
 
 
 def state(handles: dict[str, Setting]) -> State:
@@ -108,12 +107,19 @@ def test_two_new_stops_of_one_id_are_two_stops() -> None:
 
 
 def test_two_new_picks_of_one_id_are_two_picks() -> None:
-    mine: State = {("pick", "p1"): {"id": "p1", "frame": 1}}
-    theirs: State = {("pick", "p1"): {"id": "p1", "frame": 2}}
+    mine: State = {("pick", "p1"): Pick("p1", "hold", 1, (0, 0, 0))}
+    theirs: State = {("pick", "p1"): Pick("p1", "hold", 2, (0, 0, 0))}
     assert merged({}, mine, theirs, ())[0] == {
-        ("pick", "p1"): {"id": "p1", "frame": 2},
-        ("pick", "p2"): {"id": "p2", "frame": 1},
+        ("pick", "p1"): Pick("p1", "hold", 2, (0, 0, 0)),
+        ("pick", "p2"): Pick("p2", "hold", 1, (0, 0, 0)),
     }
+
+
+def written(*done: Edit) -> dict[str, Any]:
+    """The members of a sidecar with these steps, through JSON."""
+    members = {"polytope": {"vertices": [{"id": "v1"}]}}
+    found: dict[str, Any] = with_state(members, {}, (done, ()), {}, lambda: None)
+    return json.loads(json.dumps(found))  # type: ignore[no-any-return]
 
 
 def test_steps_are_the_same_after_their_json() -> None:
@@ -121,13 +127,12 @@ def test_steps_are_the_same_after_their_json() -> None:
     after = {
         **state({"v1": Setting((0.1, 2, -3), ramp="hold"), "s1": stop(3), "s2": stop(4.5)}),
         RAMP: "smooth",
-        ("pick", "p1"): {"id": "p1", "kind": "hold", "frame": 1, "rgb": [0.5, 0.5, 0.5]},
+        ("pick", "p1"): Pick("p1", "hold", 1, (0.5, 0.5, 0.5)),
         ("lock", "v1"): True,
-        ("version", "warm"): {"vertices": [], "stops": []},
     }
-    for edit in (difference(before, after, "all"), difference(after, before, "nothing")):
-        text = json.dumps(step_to_fields(edit))
-        assert step_from_fields(json.loads(text)) == edit
+    after["version", "warm"] = dict(after)
+    both = (difference(before, after, "all").undoable(), difference(after, before, "nothing"))
+    assert history_of(written(*both), "name") == (both, ())
 
 
 def test_old_steps_are_folded() -> None:
@@ -139,16 +144,18 @@ def test_old_steps_are_folded() -> None:
         now = new
     kept = bounded(steps)
     assert len(kept) == MOST_STEPS
-    assert (kept[0].steps, kept[1:]) == (500 - MOST_STEPS + 1, steps[-MOST_STEPS + 1 :])
+    assert (kept[0].steps, [*kept[1:]]) == (500 - MOST_STEPS + 1, steps[-MOST_STEPS + 1 :])
     assert bounded(kept) == kept
     assert bounded([*kept, steps[0]])[0].steps == kept[0].steps + 1
     found: State = {}
     for step in kept:
         found = step.apply(found)
     assert found == now
-    big: State = {("pick", f"p{i}"): {"id": f"p{i}", "text": "x" * 1000} for i in range(1000)}
+    path = tuple(PathKey(frame, (0.25, 0.5, 0.75)) for frame in range(20))
+    picks = [Pick(f"p{i}", "hold", 1, (0, 0, 0), path=path) for i in range(1000)]
+    big: State = {("pick", pick.id): pick for pick in picks}
     kept = bounded([difference({}, {key: pick}) for key, pick in big.items()])
-    assert len(json.dumps([step_to_fields(step) for step in kept[1:]])) < 300_000
+    assert len(json.dumps(written(*kept[1:])["history"])) < 300_000
     assert folded(kept).apply({}) == big
 
 

@@ -69,7 +69,7 @@ def test_a_track_is_called_by_the_colours_that_it_has() -> None:
 
 def test_a_fork_ends_before_the_vertex_of_another_track() -> None:
     called = [
-        next(t.called for t in Document.load(SPLIT.with_name(name)).tracks if t.name == track)
+        next(t.called for t in Document.load(SPLIT.with_name(name)).grade.tracks if t.name == track)
         for name, track in ((SPLIT.name, "v13"), ("v1_merge.p4d.json", "v5"))
     ]
     assert called == ["light grey, 10-20", "grey, 0-9"]
@@ -77,24 +77,24 @@ def test_a_fork_ends_before_the_vertex_of_another_track() -> None:
 
 def test_names_are_of_the_unedited_colours_and_at_whole_frames() -> None:
     document = Document.load(SPLIT)
-    names, tracks = document.names, [track.called for track in document.tracks]
+    names, tracks = document.grade.names, [track.called for track in document.grade.tracks]
     assert set(names) == {v["id"] for v in document.fields()["polytope"]["vertices"]}
     assert len(set(names.values())) == len(names)
     assert len(set(tracks)) == len(tracks)
     document.set("v1", rgb=(1, 0, 0))
-    assert (document.names, [t.called for t in document.tracks]) == (names, tracks)
+    assert (document.grade.names, [t.called for t in document.grade.tracks]) == (names, tracks)
 
 
 def test_a_stop_has_the_name_of_the_nearer_end() -> None:
     document = Document.load(SPLIT)
     edge = document.fields()["polytope"]["edges"][0]
-    start, end = (document.frame_of(edge[end]) for end in ("from", "to"))
+    start, end = (document.grade.frame_of(edge[end]) for end in ("from", "to"))
     for share, near in ((0.25, edge["from"]), (0.75, edge["to"])):
         stop = document.stop(edge["id"], frame=start + share * (end - start), rgb=(0, 1, 0))
-        assert document.colour_names[stop] == document.colour_names[near]
-    track = next(track for track in document.tracks if edge["id"] in track.edges)
-    assert document.called(edge["id"]) == track.called
-    assert document.called("nothing") == ""
+        assert document.grade.colour_names[stop] == document.grade.colour_names[near]
+    track = next(track for track in document.grade.tracks if edge["id"] in track.edges)
+    assert document.grade.called(edge["id"]) == track.called
+    assert document.grade.called("nothing") == ""
 
 
 def test_names_in_the_file_are_kept(tmp_path: Path) -> None:
@@ -104,10 +104,10 @@ def test_names_in_the_file_are_kept(tmp_path: Path) -> None:
     path = tmp_path / "named.p4d.json"
     path.write_text(json.dumps(fields), encoding="utf-8")
     document = Document.load(path)
-    assert document.colour_names["v1"] == "hue 0"
+    assert document.grade.colour_names["v1"] == "hue 0"
     document.set("v1", rgb=(1, 0, 0))
     document.save()
-    assert Document.load(path).colour_names["v1"] == "hue 0"
+    assert Document.load(path).grade.colour_names["v1"] == "hue 0"
 
 
 def test_encodings_do_not_change_names() -> None:

@@ -65,7 +65,7 @@ def test_steps_are_undone_in_other_sessions(plain: Path) -> None:
         assert without_history() == {**expected, "history": None}
     with pytest.raises(Palette4dError):
         document.redo()
-    while document.history:
+    while document.history.done:
         document.undo()
     document.forget_history()
     document.save()
@@ -78,7 +78,7 @@ def test_a_step_that_changes_nothing_is_none(plain: Path) -> None:
     document.reset()
     document.set_ramp("linear")
     document.save()
-    assert (document.history, plain.read_bytes()) == ((), before)
+    assert (document.history.done, plain.read_bytes()) == ((), before)
 
 
 def test_several_edits_are_one_step(plain: Path) -> None:
@@ -87,9 +87,12 @@ def test_several_edits_are_one_step(plain: Path) -> None:
     with document.one_step("everything darker"):
         document.set("v2", rgb=(0, 0, 0))
         document.set("v3", rgb=(0, 0, 0))
-    assert [step.label for step in document.history] == ["set v1 to 0 0 0", "everything darker"]
+    assert [step.label for step in document.history.done] == [
+        "set v1 to 0 0 0",
+        "everything darker",
+    ]
     document.undo()
-    assert list(document.settings) == ["v1"]
+    assert list(document.grade.settings) == ["v1"]
     before = document.fields()
     with contextlib.suppress(Palette4dError), document.one_step("half of it"):
         document.set("v2", rgb=(0, 0, 0))
@@ -104,16 +107,16 @@ def test_the_history_stays_small(plain: Path) -> None:
         if i % 100 == 0:
             document.save()
     document.save()
-    assert len(document.history) == 200
+    assert len(document.history.done) == 200
     assert plain.stat().st_size < 60_000
-    last = [document.colour(f"v{i}") for i in range(1, 6)]
+    last = [document.grade.colour(f"v{i}") for i in range(1, 6)]
     document = Document.load(plain)
-    while document.history:
+    while document.history.done:
         document.undo()
-    assert not document.settings
-    while document.undone:
+    assert not document.grade.settings
+    while document.history.undone:
         document.redo()
-    assert [document.colour(f"v{i}") for i in range(1, 6)] == last
+    assert [document.grade.colour(f"v{i}") for i in range(1, 6)] == last
 
 
 @pytest.mark.parametrize(
@@ -147,7 +150,7 @@ def test_a_history_that_does_not_fit_changes_nothing(plain: Path) -> None:
     document = Document(fields)
     with pytest.raises(Palette4dError, match="v1"):
         document.undo()
-    assert document.colour("v1") == (0.5, 0.5, 0.5)
+    assert document.grade.colour("v1") == (0.5, 0.5, 0.5)
 
 
 def test_versions(plain: Path) -> None:
@@ -158,20 +161,20 @@ def test_versions(plain: Path) -> None:
     document.save_version("blue")
     document.save()
     document = Document.load(plain)
-    assert document.versions == ("blue", "red")
-    assert document.same_edits() == ("blue",)
+    assert document.grade.versions == ("blue", "red")
+    assert document.grade.same_edits == ("blue",)
     assert document.use_version("red") is None
-    assert document.colour("v1") == (1, 0, 0)
+    assert document.grade.colour("v1") == (1, 0, 0)
     document.set("v2", rgb=(0, 1, 0))
     assert document.use_version("blue") == "before blue"
     document.set("v3", rgb=(0, 1, 0))
     assert document.use_version("blue") == "before blue 2"
-    assert document.version("before blue").colour("v2") == (0, 1, 0)
-    assert document.colour("v2") != (0, 1, 0)
+    assert document.version("before blue").grade.colour("v2") == (0, 1, 0)
+    assert document.grade.colour("v2") != (0, 1, 0)
     document.save()
     core = _core.read_sidecar(plain)
     assert [name for name, _ in core.versions] == ["before blue", "before blue 2", "blue", "red"]
-    assert Document.load(plain).versions == document.versions
+    assert Document.load(plain).grade.versions == document.grade.versions
 
 
 def test_no_step_takes_a_version_away(plain: Path) -> None:
@@ -180,23 +183,23 @@ def test_no_step_takes_a_version_away(plain: Path) -> None:
     document.set("v2", rgb=(1, 0, 0))
     document.undo()
     document.save_version("crimson")
-    assert [step.label for step in document.history] == ["set v1 to 1 0 0"]
-    assert document.undone  # saving a version leaves what redo does
+    assert [step.label for step in document.history.done] == ["set v1 to 1 0 0"]
+    assert document.history.undone  # saving a version leaves what redo does
     document.save()
     document = Document.load(plain)
     document.undo()
     document.set("v1", rgb=(0, 0, 1))
-    assert document.versions == ("crimson",)
+    assert document.grade.versions == ("crimson",)
     document.use_version("crimson")
-    assert (document.colour("v1"), len(document.history)) == ((1, 0, 0), 2)
+    assert (document.grade.colour("v1"), len(document.history.done)) == ((1, 0, 0), 2)
     document.undo()
-    assert document.colour("v1") == (0, 0, 1)
-    assert document.versions == ("before crimson", "crimson")
+    assert document.grade.colour("v1") == (0, 0, 1)
+    assert document.grade.versions == ("before crimson", "crimson")
     assert document.use_version("crimson") is None
     document.set("v1", rgb=(0, 1, 0))
     assert document.save_version("crimson") == "former crimson"
     assert document.save_version("crimson") is None
-    assert document.version("former crimson").colour("v1") == (1, 0, 0)
+    assert document.version("former crimson").grade.colour("v1") == (1, 0, 0)
 
 
 def test_a_removed_version_comes_back(plain: Path) -> None:
@@ -205,15 +208,15 @@ def test_a_removed_version_comes_back(plain: Path) -> None:
     document.save_version("red")
     document.remove_version("red")
     document.undo()
-    assert document.version("red").colour("v1") == (1, 0, 0)
+    assert document.version("red").grade.colour("v1") == (1, 0, 0)
     document.redo()
-    assert document.versions == ()
+    assert document.grade.versions == ()
     document.set("v1", rgb=(0, 1, 0))
     document.save_version("red")
     document.undo()
     document.undo()  # the removal; the name holds other edits now
     document.redo()
-    assert document.version("red").colour("v1") == (0, 1, 0)
+    assert document.version("red").grade.colour("v1") == (0, 1, 0)
 
 
 def test_versions_of_two_writers_are_no_steps(plain: Path) -> None:
@@ -225,8 +228,8 @@ def test_versions_of_two_writers_are_no_steps(plain: Path) -> None:
     mine.save()
     theirs.save()
     found = Document.load(plain)
-    assert found.versions == ("blue", "red")
-    assert [step.label for step in found.history] == ["set v1 to 1 0 0", "set v2 to 0 0 1"]
+    assert found.grade.versions == ("blue", "red")
+    assert [step.label for step in found.history.done] == ["set v1 to 1 0 0", "set v2 to 0 0 1"]
 
 
 def test_steps_of_older_files_that_save_versions(plain: Path) -> None:
@@ -240,7 +243,7 @@ def test_steps_of_older_files_that_save_versions(plain: Path) -> None:
     fields["history"]["done"].append(saved)
     document = Document(fields)
     assert document.undo().label == "set v1 to 1 0 0"
-    assert document.versions == ("red",)
+    assert document.grade.versions == ("red",)
 
 
 def test_a_version_is_a_document_of_its_own(plain: Path, tmp_path: Path) -> None:
@@ -250,16 +253,16 @@ def test_a_version_is_a_document_of_its_own(plain: Path, tmp_path: Path) -> None
     document.reset()
     document.save()
     red = document.version("red")
-    assert red.colour("v1") == (1, 0, 0)
-    assert red.palette(0).edited[0].tolist() == [1, 0, 0]
-    assert not document.settings
+    assert red.grade.colour("v1") == (1, 0, 0)
+    assert red.grade.palette(0).edited[0].tolist() == [1, 0, 0]
+    assert not document.grade.settings
     before = plain.read_bytes()
     for target in ((), (plain,)):
         with pytest.raises(Palette4dError):
             red.save(*target)
     assert plain.read_bytes() == before
     red.save(tmp_path / "red.p4d.json")
-    assert Document.load(tmp_path / "red.p4d.json").colour("v1") == (1, 0, 0)
+    assert Document.load(tmp_path / "red.p4d.json").grade.colour("v1") == (1, 0, 0)
     assert document.version("") is document
 
 
@@ -284,7 +287,7 @@ def test_many_versions_are_listed_in_linear_time(plain: Path) -> None:
     fields["versions"] = [{"name": f"n{i}", "edits": nothing} for i in range(10_000)]
     document = Document(fields)
     start = time.process_time()
-    assert len(document.same_edits()) == 10_000
+    assert len(document.grade.same_edits) == 10_000
     assert time.process_time() - start < 3
 
 
@@ -299,7 +302,7 @@ def test_a_new_analysis_keeps_steps_and_versions(plain: Path) -> None:
         again.save(plain)
     again.save(plain, on_edits="keep")
     assert {**sidecar.load(plain), "clip": None} == {**before, "clip": None}
-    assert again.versions == ("red",)
+    assert again.grade.versions == ("red",)
 
 
 ACTS = st.lists(
@@ -357,17 +360,17 @@ def test_any_edits_can_be_undone_and_done_again(plain: Path, acts: list[Any]) ->
             assert document.fields() == before
     document.save()
     last = {**sidecar.load(plain), "history": None}
-    while document.history:
+    while document.history.done:
         document.undo()
     document.save()
     bare = {n: v for n, v in sidecar.load(plain).items() if n not in ("history", "versions")}
     assert sidecar.dumps(bare).encode() == first
     document = Document.load(plain)
     undone = 0
-    while document.undone and undone < len(acts):
+    while document.history.undone and undone < len(acts):
         document.redo()
         undone += 1
-    if not document.undone and not any(name == "undo" for name, *_ in acts):
+    if not document.history.undone and not any(name == "undo" for name, *_ in acts):
         assert {**document.fields(), "history": None} == last
 
 
@@ -382,32 +385,32 @@ def test_undo_beside_another_writer(plain: Path) -> None:
     mine.set("v3", rgb=(0, 0, 1))
     mine.save()
     found = Document.load(plain)
-    assert set(found.settings) == {"v2", "v3"}
-    assert [step.label for step in found.history] == [
+    assert set(found.grade.settings) == {"v2", "v3"}
+    assert [step.label for step in found.history.done] == [
         "set v1 to 1 0 0",
         "set v2 to 0 1 0",
         "undo: set v1 to 1 0 0",
         "set v3 to 0 0 1",
     ]
-    for _ in found.history:
+    for _ in found.history.done:
         found.undo()
-    assert not found.settings
+    assert not found.grade.settings
 
 
 def test_picks_are_undone_and_merged(plain: Path) -> None:
     first = plain.read_bytes()
     mine, theirs = Document.load(plain), Document.load(plain)
-    seen = mine.palette(4).rgb.mean(axis=0)
+    seen = mine.grade.palette(4).rgb.mean(axis=0)
     mine.pick(frame=4, colour=seen, by=(0.1, 0, 0), follow=False)
     mine.save()
     theirs.pick(frame=12, colour=seen, by=(0, 0.1, 0), follow=False)
     theirs.lock("v1")
     theirs.save()
     found = Document.load(plain)
-    assert [pick.id for pick in found.picks] == ["p1", "p2"]
-    assert found.locks == ("v1",)
+    assert [pick.id for pick in found.grade.picks] == ["p1", "p2"]
+    assert found.grade.locks == ("v1",)
     assert found.fields() == theirs.fields()
-    while found.history:
+    while found.history.done:
         found.undo()
     found.forget_history()
     found.save()

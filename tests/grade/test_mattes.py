@@ -129,12 +129,12 @@ def test_a_copy_learns_again_in_the_other_clip(
     monkeypatch.setattr("palette4d.grade.clip_of_picks.find_clip", lambda *_: clip)
     fit = other.copy_from(document)
     if not has_coat:
-        assert not other.picks
+        assert not other.grade.picks
         assert "p1" in str(fit)  # said, not dropped in silence
         assert np.abs(other.recolour(mirrored[0], 0) - mirrored[0]).max() < 0.02
         return
-    (pick,) = other.picks
-    assert pick.matte != document.picks[0].matte
+    (pick,) = other.grade.picks
+    assert pick.matte != document.grade.picks[0].matte
     assert pick.pixel is not None
     assert coat[0][pick.pixel[1], pick.pixel[0]]
     change = moved(other, mirrored[0])

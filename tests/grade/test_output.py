@@ -28,8 +28,10 @@ def image() -> np.ndarray:
 
 
 def test_the_weights_of_a_frames_colours_sum_to_one(document, image):
-    frame = document.frames[0]
-    mattes = [document.matte(image, frame, f"weight:{id_}") for id_ in document.palette(frame).ids]
+    frame = document.grade.frames[0]
+    mattes = [
+        document.matte(image, frame, f"weight:{id_}") for id_ in document.grade.palette(frame).ids
+    ]
     assert mattes[0].shape == (40, 50)
     assert mattes[0].dtype == np.float32
     np.testing.assert_allclose(np.sum(mattes, axis=0), 1, atol=1e-3)
@@ -39,22 +41,22 @@ def test_the_weights_of_a_frames_colours_sum_to_one(document, image):
 
 
 def test_a_weight_follows_its_colour_along_the_edge(document, image):
-    edge = next(iter(document.core.polytope.edge_ids))
+    edge = next(iter(document.grade.core.polytope.edge_ids))
     first, last = (document.fields()["polytope"]["edges"][0][end] for end in ("from", "to"))
     frames = {v["id"]: v["frame"] for v in document.fields()["polytope"]["vertices"]}
     frame = (frames[first] + frames[last]) / 2
-    index = document.palette(frame).ids.index(edge)
+    index = document.grade.palette(frame).ids.index(edge)
     matte = document.matte(image, frame, f"weight:{first}")
     assert np.array_equal(matte, document.matte(image, frame, f"weight:{last}"))
     assert (matte >= document.weights(image, frame)[..., index] - 3e-4).all()
 
 
 def test_outside_is_0_inside_and_1_far_away(document):
-    palette = document.palette(document.frames[0])
+    palette = document.grade.palette(document.grade.frames[0])
     inside, far = palette.rgb.mean(axis=0), np.array([0, 0, 9])
     points = np.array([[inside, inside + far, inside - far]], np.float32)
-    assert document.matte(points, document.frames[0], "outside").tolist() == [[0, 1, 1]]
-    near = document.matte(points, document.frames[0], "outside", outside_at=100)
+    assert document.matte(points, document.grade.frames[0], "outside").tolist() == [[0, 1, 1]]
+    near = document.matte(points, document.grade.frames[0], "outside", outside_at=100)
     assert (near[0, 1:] > 0).all()
     assert (near[0, 1:] < 0.2).all()
 
@@ -101,7 +103,7 @@ def picked() -> Document:
 def pair(picked) -> np.ndarray:
     """The colour of pick p1, left, and another one, right, both with noise."""
     noise = np.random.default_rng(2).normal(0, 0.01, (40, 80, 3))
-    image = np.broadcast_to(picked.picks[0].rgb, (40, 80, 3)) + noise
+    image = np.broadcast_to(picked.grade.picks[0].rgb, (40, 80, 3)) + noise
     image[:, 40:] = (0.7, 0.15, 0.1) + noise[:, 40:]
     return image.astype(np.float32)
 

@@ -26,7 +26,7 @@ def test_shares_are_the_mean_barycentric_weights() -> None:
     plain = Document.load(SPLIT)
     random, colours, expected = np.random.default_rng(3), {}, {}
     for frame in (0, 4, 8):
-        palette = plain.palette(frame)
+        palette = plain.grade.palette(frame)
         assert len(palette.rgb) == 4
         weights, pixels = random.dirichlet(np.ones(4), 5), random.dirichlet(np.ones(5))
         colours[frame] = np.column_stack([weights @ palette.rgb, pixels]).tolist()
@@ -34,11 +34,13 @@ def test_shares_are_the_mean_barycentric_weights() -> None:
             np.vstack([palette.rgb.T, np.ones(4)]), np.vstack([palette.rgb.T @ weights.T, [1] * 5])
         )
         for id_, share in zip(palette.ids, solved @ pixels, strict=True):
-            track = next(t for t in plain.tracks if id_ in (*t.vertices, *t.edges))
+            track = next(t for t in plain.grade.tracks if id_ in (*t.vertices, *t.edges))
             expected.setdefault(track.name, {})[frame] = share
     document = with_colours(colours)
-    found = track_shares(ClipColours(document.core.polytope, document.fields()), document.tracks)
-    assert [*found] == [track.name for track in document.tracks]
+    found = track_shares(
+        ClipColours(document.grade.core.polytope, document.fields()), document.grade.tracks
+    )
+    assert [*found] == [track.name for track in document.grade.tracks]
     for name, shares in expected.items():
         assert found[name].mean == pytest.approx(np.mean([*shares.values()]), abs=1e-3)
         assert found[name].most == pytest.approx(max(shares.values()), abs=1e-3)
@@ -52,7 +54,9 @@ def test_only_frames_that_have_the_track_count() -> None:
     # The light grey track begins after frame 9.
     grey = [[0.4, 0.4, 0.45, 1.0]]
     shares = [
-        track_shares(ClipColours(document.core.polytope, document.fields()), document.tracks)
+        track_shares(
+            ClipColours(document.grade.core.polytope, document.fields()), document.grade.tracks
+        )
         for document in (with_colours({0: grey, 5: grey, 15: grey}), with_colours({15: grey}))
     ]
     assert shares[0]["v13"] == shares[1]["v13"]
@@ -79,7 +83,9 @@ def test_info_has_the_shares(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_frame_whose_colours_have_no_pixels_counts_for_nothing() -> None:
     rows = {0: [[0.5, 0.4, 0.3, 1.0]], 10: [[0.3, 0.3, 0.3, 0.0]]}
     shares = [
-        track_shares(ClipColours(document.core.polytope, document.fields()), document.tracks)
+        track_shares(
+            ClipColours(document.grade.core.polytope, document.fields()), document.grade.tracks
+        )
         for document in (with_colours(rows), with_colours({0: rows[0]}))
     ]
     assert shares[0] == shares[1]

@@ -90,7 +90,9 @@ def test_no_acknowledged_edit_is_lost(tmp_path: Path, locks: tuple[str, ...], co
     path.write_bytes((GOLDEN / "v1_split.p4d.json").read_bytes())
     acknowledged, refused = children(path, count, locks)
     document = Document.load(path)
-    found: dict[object, float] = {(s.edge, s.frame): s.rgb[0] for s in document.settings.values()}
+    found: dict[object, float] = {
+        (s.edge, s.frame): s.rgb[0] for s in document.grade.settings.values()
+    }
     for edge, frame, red in acknowledged:
         assert found.pop((edge, frame)) == red
     assert not found
@@ -148,7 +150,7 @@ def test_who_may_only_read_a_folder_cannot_hold_up_a_save(tmp_path: Path) -> Non
         document.save()
     finally:
         os.close(handle)
-    assert Document.load(edited).settings["v1"].rgb == (0.5, 0.5, 0.5)
+    assert Document.load(edited).grade.settings["v1"].rgb == (0.5, 0.5, 0.5)
 
 
 def test_a_program_that_was_killed_while_it_removed_a_lock_stops_nobody(

@@ -211,8 +211,11 @@ def test_every_output_of_the_node_is_the_documents(
 ) -> None:
     path = GOLDEN / f"{name}.p4d.json"
     document = Document.load(path)
-    stops = [stop["id"] for stop in document.core.edits.stops]
-    ids = {"vertex": document.core.polytope.vertex_ids[1], "stop": stops[0] if stops else "v1"}
+    stops = [stop["id"] for stop in document.grade.core.edits.stops]
+    ids = {
+        "vertex": document.grade.core.polytope.vertex_ids[1],
+        "stop": stops[0] if stops else "v1",
+    }
     image = picture(channels)
     if premultiplied:
         image[..., :3] *= image[..., 3:]

@@ -102,10 +102,10 @@ def test_edits_only_add_frames(edited: list[float], added: list[int]) -> None:
 
 def test_the_largest_change_is_shown() -> None:
     document = Document.load(SPLIT)
-    stored = ClipColours(document.core.polytope, document.fields())
-    before = default_frames(PlottedPalette.of(document.core), stored)
+    stored = ClipColours(document.grade.core.polytope, document.fields())
+    before = default_frames(PlottedPalette.of(document.grade.core), stored)
     at = next(t for t in range(5, 18) if not {t, t + 1} & set(before))
-    colour = document.palette(at).rgb[0]
+    colour = document.grade.palette(at).rgb[0]
     document.pick(at, colour=colour, by=(0.2, 0, 0), start=at, until=at, follow=False)
-    after = default_frames(PlottedPalette.of(document.core), stored)
+    after = default_frames(PlottedPalette.of(document.grade.core), stored)
     assert sorted({*before, at}) == after

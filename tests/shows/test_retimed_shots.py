@@ -77,7 +77,7 @@ def test_a_speed_that_changes_keeps_the_grade(tmp_path: Path, media: Path) -> No
     analyze_shots(edl(tmp_path, "024.0"), tmp_path / "s", **arguments)
     target = tmp_path / "s" / "A001C001.p4d.json"
     document = Document.load(target)
-    document.set(next(iter(document.tracks)).vertices[0], rgb=(0.1, 0.2, 0.3))
+    document.set(next(iter(document.grade.tracks)).vertices[0], rgb=(0.1, 0.2, 0.3))
     document.save()
     edits = sidecar.load(target)["edits"]
     assert "speed" not in sidecar.load(target)["extra"]["edit"]

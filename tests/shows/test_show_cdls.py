@@ -41,7 +41,7 @@ def show(tmp_path: Path) -> Path:
         tmp_path / "cut.edl", tmp_path / "s", rate=Fraction(24), media=tmp_path / "media", **QUICK
     )
     document = Document.load(tmp_path / "s" / "one.p4d.json")
-    document.set(document.tracks[0].vertices[0], rgb=(0.4, 0.2, 0.1))
+    document.set(document.grade.tracks[0].vertices[0], rgb=(0.4, 0.2, 0.1))
     document.save()
     return done.path
 

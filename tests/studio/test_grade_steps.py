@@ -54,7 +54,7 @@ class Hand:
         return self.session.document
 
     def pick_of(self, id_: str) -> Pick:
-        return next(pick for pick in self.document.picks if pick.id == id_)
+        return next(pick for pick in self.document.grade.picks if pick.id == id_)
 
     def pixel(self, x: int, y: int) -> QPointF:
         return self.window.viewer.point_of(x + 0.5, y + 0.5)
@@ -117,7 +117,7 @@ def rows(hand: Hand) -> Iterator[Row]:
     """Yield each gesture with the verb's words, which are asked for after the gesture."""
     window, session = hand.window, hand.session
     viewer, timeline, inspector = window.viewer, window.timeline, window.inspector
-    core = hand.document.core
+    core = hand.document.grade.core
     first, *_ = core.polytope.vertex_ids
     times = np.asarray(core.polytope.vertices)[:, 3]
     spans = {
@@ -127,7 +127,7 @@ def rows(hand: Hand) -> Iterator[Row]:
     edge = max(spans, key=lambda id_: float(spans[id_][1] - spans[id_][0]))
 
     def colour(id_: str) -> list[str]:
-        return ["--rgb", *map(repr, hand.document.colour(id_))]
+        return ["--rgb", *map(repr, hand.document.grade.colour(id_))]
 
     def key(key: Qt.Key, keys: Qt.KeyboardModifier = NO_KEYS) -> Callable[[], object]:
         return lambda: QTest.keyClick(window, key, keys)

@@ -51,7 +51,7 @@ def panel(qapp: QApplication, sidecar: Path) -> Generator[Inspector]:
 
 def colour(panel: Inspector, id_: str = "v2") -> tuple[float, ...]:
     assert panel.session.document is not None
-    return panel.session.document.colour(id_)
+    return panel.session.document.grade.colour(id_)
 
 
 def test_it_says_the_colour_in_all_units(panel: Inspector) -> None:
@@ -108,7 +108,7 @@ def test_a_drag_on_the_wheel_turns_the_hue_as_one_step(qtbot: Any, panel: Inspec
     assert after[1] == pytest.approx(0.1, abs=1e-6)
     assert after[2] == pytest.approx(120, abs=1e-3)
     assert panel.session.document is not None
-    assert len(panel.session.document.history) == 1
+    assert len(panel.session.document.history.done) == 1
     panel.session.undo()
     assert colour(panel) == (0.9, 0.1, 0.1)
 
@@ -144,7 +144,7 @@ def test_the_scope_track_is_the_verbs(panel: Inspector, sidecar: Path, tmp_path:
     assert main(["edit", str(twin), *words]) == 0
     document = panel.session.document
     assert document is not None
-    assert set(document.settings) == {"v2", "v6", "v10", "v15"}
+    assert set(document.grade.settings) == {"v2", "v6", "v10", "v15"}
     assert sidecar.read_bytes() == twin.read_bytes()
 
 
@@ -155,11 +155,11 @@ def test_the_scope_palette_turns_all_hues(panel: Inspector) -> None:
     panel.boxes["h"].setValue(panel.boxes["h"].value() + 40)
     document = panel.session.document
     assert document is not None
-    assert len(document.settings) >= 12
+    assert len(document.grade.settings) >= 12
     after = lch.of(colour(panel, "v3"))
     assert (after[2] - before[2]) % 360 == pytest.approx(40, abs=0.1)
     panel.session.undo()
-    assert not document.settings or not panel.session.document.settings
+    assert not document.grade.settings or not panel.session.document.grade.settings
 
 
 def test_a_row_at_the_playhead_gets_a_stop(panel: Inspector) -> None:
@@ -169,7 +169,7 @@ def test_a_row_at_the_playhead_gets_a_stop(panel: Inspector) -> None:
     panel.boxes["R"].setValue(0.5)
     document = panel.session.document
     assert document is not None
-    (setting,) = document.settings.values()
+    (setting,) = document.grade.settings.values()
     assert (setting.edge, setting.frame) == ("e1", 5)
 
 
@@ -179,11 +179,11 @@ def test_the_ramp_of_a_handle_and_of_the_clip(panel: Inspector) -> None:
     panel.ramp.activated.emit(panel.ramp.currentIndex())
     document = panel.session.document
     assert document is not None
-    assert document.settings["v2"].ramp == "hold"
+    assert document.grade.settings["v2"].ramp == "hold"
     panel.session.select()
     panel.ramp.setCurrentIndex(panel.ramp.findData("smooth"))
     panel.ramp.activated.emit(panel.ramp.currentIndex())
-    assert panel.session.document.ramp == "smooth"
+    assert panel.session.document.grade.ramp == "smooth"
 
 
 def test_reset(qtbot: Any, panel: Inspector) -> None:

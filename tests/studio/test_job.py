@@ -21,7 +21,7 @@ def test_a_job_does_what_the_command_does_and_reports(tmp_path: Path, analysed: 
     assert fractions >= {0.0, 1.0}
     assert job.messages == ""
     assert f"wrote {out}" in job.output
-    assert palette4d.load(out).frames == (1, 3, 1)
+    assert palette4d.load(out).grade.frames == (1, 3, 1)
 
 
 def test_a_job_runs_no_module_of_the_working_folder(

@@ -41,7 +41,7 @@ def at(window: Window, x: int, y: int) -> QPointF:
 
 def picks(window: Window) -> tuple[Pick, ...]:
     assert window.session.document is not None
-    return window.session.document.picks
+    return window.session.document.grade.picks
 
 
 def pick(qtbot: Any, window: Window, x: int, y: int) -> None:
@@ -116,21 +116,21 @@ def test_a_drag_of_the_new_colour_learns_nothing(
     wheel.let_go.emit()
     assert len(learned) == before
     assert session.document is not None
-    assert len(session.document.history) == 2
+    assert len(session.document.history.done) == 2
 
 
 def test_bars_of_the_matte_show_live_and_are_one_step(qtbot: Any, opened: Window) -> None:
     pick(qtbot, opened, 40, 30)
     session, panel = opened.session, opened.inspector.panel
     assert session.document is not None
-    steps = len(session.document.history)
+    steps = len(session.document.history.done)
     for value in (1.0, 2.0, 3.0):
         panel.bars["reach"].moved.emit(value)
         assert picks(opened)[0].reach == value
         assert session.dragging
     panel.bars["reach"].let_go.emit()
     assert not session.dragging
-    assert len(session.document.history) == steps + 1
+    assert len(session.document.history.done) == steps + 1
     panel.bars["reach"].moved.emit(0.05)  # it catches at 0
     panel.bars["reach"].let_go.emit()
     assert picks(opened)[0].reach == 0
@@ -396,7 +396,7 @@ def wheel(widget: QWidget, at: QPointF, turns: int) -> None:
 def test_the_pipette_takes_a_colour_of_the_picture(qtbot: Any, opened: Window) -> None:
     document = opened.session.document
     assert document is not None
-    id_ = document.core.polytope.vertex_ids[0]
+    id_ = document.grade.core.polytope.vertex_ids[0]
     opened.session.select(id_)
     qtbot.mouseClick(opened.inspector.dropper, LEFT)
     qtbot.mouseClick(opened.viewer, LEFT, pos=at(opened, 40, 30).toPoint())
@@ -404,7 +404,9 @@ def test_the_pipette_takes_a_colour_of_the_picture(qtbot: Any, opened: Window) -
     frame = opened.session.player.frame(opened.session.frame)
     assert frame is not None
     assert opened.session.document is not None
-    np.testing.assert_allclose(opened.session.document.colour(id_), frame[30, 40, :3], atol=1e-6)
+    np.testing.assert_allclose(
+        opened.session.document.grade.colour(id_), frame[30, 40, :3], atol=1e-6
+    )
     assert not opened.inspector.dropper.isChecked()
 
 
@@ -412,15 +414,15 @@ def test_versions_are_kept_and_used(qtbot: Any, opened: Window) -> None:
     session, versions = opened.session, opened.inspector.versions
     document = session.document
     assert document is not None
-    id_ = document.core.polytope.vertex_ids[0]
-    before = document.colour(id_)
+    id_ = document.grade.core.polytope.vertex_ids[0]
+    before = document.grade.colour(id_)
     qtbot.mouseClick(versions.keep, LEFT)
     session.edit(lambda d: d.set(id_, rgb=NEW))
     qtbot.mouseClick(versions.keep, LEFT)
     assert list(versions.buttons) == ["A", "B"]
     qtbot.mouseClick(versions.buttons["A"], LEFT)
     assert session.document is not None
-    assert session.document.colour(id_) == before
+    assert session.document.grade.colour(id_) == before
     assert versions.buttons["A"].isChecked()
     assert not versions.buttons["B"].isChecked()
 

@@ -78,18 +78,18 @@ def test_a_drag_writes_only_what_is_dropped(session: Session, sidecar: Path) -> 
     for k in range(5):
         session.drag(lambda document, k=k: document.set(id_, rgb=(k / 8, 0, 0)))
         assert session.document is not None
-        assert session.document.colour(id_) == (k / 8, 0, 0)
+        assert session.document.grade.colour(id_) == (k / 8, 0, 0)
         session.tick(LATER)
     assert sidecar.read_bytes() == before
     session.drop()
     session.tick(LATER)
     loaded = palette4d.load(sidecar)
-    assert loaded.colour(id_) == (0.5, 0, 0)
+    assert loaded.grade.colour(id_) == (0.5, 0, 0)
     session.undo()
     session.tick(2 * LATER)
-    assert palette4d.load(sidecar).colour(id_) == palette4d.load(
+    assert palette4d.load(sidecar).grade.colour(id_) == palette4d.load(
         GOLDEN / "v1_tetrahedron.p4d.json"
-    ).colour(id_)
+    ).grade.colour(id_)
 
 
 def test_edits_without_a_pause_are_saved_all_the_same(
@@ -123,13 +123,13 @@ def test_other_programs_edits_are_shown_and_merged(session: Session, sidecar: Pa
     assert main(["edit", str(sidecar), "set", ids[1], "--rgb", "1", "0", "0"]) == 0
     session.tick(LATER)
     assert session.document is not None
-    assert session.document.colour(ids[1]) == (1, 0, 0)
+    assert session.document.grade.colour(ids[1]) == (1, 0, 0)
     assert heard
     session.edit(lambda document: document.set(ids[0], rgb=(0, 1, 0)))
     assert main(["edit", str(sidecar), "set", ids[2], "--rgb", "0", "0", "1"]) == 0
     session.tick(2 * LATER)
     both = palette4d.load(sidecar)
-    assert [both.colour(id_) for id_ in ids[:3]] == [(0, 1, 0), (1, 0, 0), (0, 0, 1)]
+    assert [both.grade.colour(id_) for id_ in ids[:3]] == [(0, 1, 0), (1, 0, 0), (0, 0, 1)]
 
 
 def test_a_file_that_another_program_broke_is_not_overwritten(
@@ -144,9 +144,9 @@ def test_a_file_that_another_program_broke_is_not_overwritten(
     session.tick(LATER + TRY_AGAIN)
     assert sidecar.read_text() == '{"schema": '
     assert session.status.level == "error"
-    assert palette4d.load(next(recovery_files(sidecar))).colour(id_) == (0, 1, 0)
+    assert palette4d.load(next(recovery_files(sidecar))).grade.colour(id_) == (0, 1, 0)
     assert session.save_as(tmp_path / "mine.p4d.json")
-    assert palette4d.load(tmp_path / "mine.p4d.json").colour(id_) == (0, 1, 0)
+    assert palette4d.load(tmp_path / "mine.p4d.json").grade.colour(id_) == (0, 1, 0)
 
 
 def test_the_copy_of_a_file_with_the_longest_name(
@@ -161,7 +161,7 @@ def test_the_copy_of_a_file_with_the_longest_name(
     session.edit(lambda document: document.set(id_, rgb=(0, 1, 0)))
     longest.write_text("{")
     assert not session.save()
-    assert palette4d.load(next(recovery_files(longest))).colour(id_) == (0, 1, 0)
+    assert palette4d.load(next(recovery_files(longest))).grade.colour(id_) == (0, 1, 0)
 
 
 def test_what_an_earlier_session_could_not_save_stays(
@@ -180,11 +180,11 @@ def test_what_an_earlier_session_could_not_save_stays(
     assert recovered(sidecar) == copy
     later.edit(lambda document: document.set(id_, rgb=(0.0, 1.0, 0.0)))
     assert later.save()
-    assert palette4d.load(copy).colour(id_) == (1.0, 0.0, 0.0)
+    assert palette4d.load(copy).grade.colour(id_) == (1.0, 0.0, 0.0)
     sidecar.write_text("{")
     later.edit(lambda document: document.set(id_, rgb=(0.0, 0.0, 1.0)))
     assert not later.save()
-    assert palette4d.load(copy).colour(id_) == (1.0, 0.0, 0.0)
+    assert palette4d.load(copy).grade.colour(id_) == (1.0, 0.0, 0.0)
     sidecar.write_bytes(whole)
 
 
@@ -212,7 +212,7 @@ def test_another_file_is_opened_only_when_nothing_is_lost(
         session.open_sidecar(other)
     assert session.path == sidecar
     assert session.document is not None
-    assert session.document.colour(id_) == (1.0, 0.0, 0.0)
+    assert session.document.grade.colour(id_) == (1.0, 0.0, 0.0)
 
 
 def test_edits_that_fail_become_the_status(session: Session) -> None:

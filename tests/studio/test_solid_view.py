@@ -66,7 +66,7 @@ def drag(qtbot: Any, view: SolidView, start: QPoint, by: QPoint) -> None:
 
 def colour(view: SolidView, id_: str) -> np.ndarray:
     assert view.session.document is not None
-    return np.array(view.session.document.colour(id_))
+    return np.array(view.session.document.grade.colour(id_))
 
 
 def test_a_dragged_colour_follows_the_pointer(qtbot: Any, view: SolidView) -> None:
@@ -80,7 +80,7 @@ def test_a_dragged_colour_follows_the_pointer(qtbot: Any, view: SolidView) -> No
     assert view.session.selection == ("v2",)
     document = view.session.document
     assert document is not None
-    assert len(document.history) == 1
+    assert len(document.history.done) == 1
     view.session.undo()
     assert colour(view, "v2").tolist() == [0.9, 0.1, 0.1]
 
@@ -104,10 +104,10 @@ def test_at_a_frame_between_vertices_a_stop_is_made(qtbot: Any, view: SolidView)
     drag(qtbot, view, at(view, "e2"), QPoint(-20, 0))
     document = view.session.document
     assert document is not None
-    (setting,) = document.settings.values()
+    (setting,) = document.grade.settings.values()
     assert (setting.edge, setting.frame) == ("e2", 5)
     drag(qtbot, view, at(view, "e2"), QPoint(0, -20))  # the same stop again
-    assert len(view.session.document.settings) == 1
+    assert len(view.session.document.grade.settings) == 1
 
 
 def test_a_drag_of_the_ground_turns_the_solid(qtbot: Any, view: SolidView) -> None:
@@ -115,7 +115,7 @@ def test_a_drag_of_the_ground_turns_the_solid(qtbot: Any, view: SolidView) -> No
     drag(qtbot, view, QPoint(12, 60), QPoint(60, 30))
     assert (view.azimuth, view.elevation) != before
     assert view.session.document is not None
-    assert not view.session.document.edited
+    assert not view.session.document.grade.edited
     qtbot.mouseDClick(view, LEFT, pos=QPoint(12, 60))
     assert (view.azimuth, view.elevation) == before
 

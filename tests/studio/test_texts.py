@@ -71,7 +71,7 @@ def test_a_translation_replaces_every_text(
 ) -> None:
     session = foreign.session
     assert session.document is not None
-    session.select(session.document.core.polytope.vertex_ids[0])
+    session.select(session.document.grade.core.polytope.vertex_ids[0])
     session.edit(lambda document: document.pick(6, colour=(0.5, 0.4, 0.3), to=(1, 0, 0)))
     for name in ("analyze", "analyze_again", "render", "bake", "export", "config", "install"):
         foreign.action(name)()

@@ -120,12 +120,12 @@ def test_a_double_click_adds_a_stop_as_the_verb_does(
     twin = Path(shutil.copy(sidecar, tmp_path / "twin.p4d.json"))
     document = view.session.document
     assert document is not None
-    rgb = document.colour("e1", frame=5)
+    rgb = document.grade.colour("e1", frame=5)
     qtbot.mouseDClick(view, LEFT, pos=on_band(view, "e1", 5))
     document = view.session.document
     (new,) = view.session.selection
-    assert document.settings[new].edge == "e1"
-    assert document.settings[new].frame == 5
+    assert document.grade.settings[new].edge == "e1"
+    assert document.grade.settings[new].frame == 5
     view.session.tick(LATER)
     words = ["set", "e1", "--frame", "5", "--rgb", *(repr(value) for value in rgb)]
     assert main(["edit", str(twin), *words]) == 0
@@ -138,23 +138,23 @@ def test_a_stop_is_dragged_to_whole_frames_and_stays_inside_its_edge(
     view.session.edit(lambda d: d.stop("e1", frame=4, rgb=(0.5, 0.5, 0.9)))
     document = view.session.document
     assert document is not None
-    stop = next(i for i, s in document.settings.items() if s.edge == "e1" and s.frame == 4)
-    steps = len(document.history)
+    stop = next(i for i, s in document.grade.settings.items() if s.edge == "e1" and s.frame == 4)
+    steps = len(document.history.done)
     start = place(view, stop)
     end = QPoint(round(view.places.x_of(6.3)), start.y() + 40)
     drag(qtbot, view, start, end)
     document = view.session.document
-    assert document.settings[stop].frame == 6
-    assert len(document.history) == steps + 1  # a drag is one step
+    assert document.grade.settings[stop].frame == 6
+    assert len(document.history.done) == steps + 1  # a drag is one step
     drag(qtbot, view, place(view, stop), QPoint(view.width() + 500, start.y()))
     assert view.session.document is not None
-    last = view.session.document.settings[stop].frame
-    edge = next(e for e in document.core.polytope.edges[:1])
+    last = view.session.document.grade.settings[stop].frame
+    edge = next(e for e in document.grade.core.polytope.edges[:1])
     assert last is not None
-    assert last < float(document.core.polytope.vertices[edge[1], 3])
+    assert last < float(document.grade.core.polytope.vertices[edge[1], 3])
     view.session.undo()
     view.session.undo()
-    assert view.session.document.settings[stop].frame == 4
+    assert view.session.document.grade.settings[stop].frame == 4
 
 
 def test_rows_that_have_no_room_are_scrolled_by_the_bar(qtbot: Any, view: TimelineView) -> None:
@@ -187,12 +187,12 @@ def test_nudge_and_reset_of_a_selected_stop(view: TimelineView) -> None:
     view.session.edit(lambda d: d.stop("e1", frame=4, rgb=(0.5, 0.5, 0.9)))
     document = view.session.document
     assert document is not None
-    stop = next(i for i, s in document.settings.items() if s.edge == "e1" and s.frame == 4)
+    stop = next(i for i, s in document.grade.settings.items() if s.edge == "e1" and s.frame == 4)
     view.session.select(stop)
     view.nudge(1)
-    assert view.session.document.settings[stop].frame == 5
+    assert view.session.document.grade.settings[stop].frame == 5
     grade_steps.reset(view.session)
-    assert stop not in view.session.document.settings
+    assert stop not in view.session.document.grade.settings
 
 
 def test_the_ruler_moves_the_playhead(qtbot: Any, view: TimelineView) -> None:
@@ -219,7 +219,7 @@ def test_weights_of_the_pixel_are_written_beside_the_rows(view: TimelineView) ->
     gutter = (0, timeline_places.RULER, timeline_places.GUTTER, view.height())
     before = view.grab().copy(*gutter).toImage()
     assert view.session.document is not None
-    ids = view.session.document.palette(view.session.frame).ids
+    ids = view.session.document.grade.palette(view.session.frame).ids
     view.session.show_probe(Probe(0, 0, (0, 0, 0), (0, 0, 0), {ids[0]: 0.75, ids[1]: 0.25}))
     assert view.grab().copy(*gutter).toImage() != before
 
@@ -262,18 +262,18 @@ def test_the_menu_of_a_stop_sets_its_ramp_and_locks_it(view: TimelineView) -> No
     view.session.edit(lambda d: d.stop("e1", frame=4, rgb=(0.5, 0.5, 0.9)))
     document = view.session.document
     assert document is not None
-    stop = next(i for i, s in document.settings.items() if s.edge == "e1" and s.frame == 4)
+    stop = next(i for i, s in document.grade.settings.items() if s.edge == "e1" and s.frame == 4)
     at = QPointF(place(view, stop))
     menu = view.menu_for(view.places.hit(at), at.x())
     ramps = next(a.menu() for a in menu.actions() if a.menu() is not None)
     next(a for a in ramps.actions() if a.text() == "hold").trigger()
-    assert view.session.document.settings[stop].ramp == "hold"
+    assert view.session.document.grade.settings[stop].ramp == "hold"
     grade_steps.lock(view.session)
-    assert view.session.document.locks == (stop,)
+    assert view.session.document.grade.locks == (stop,)
     grade_steps.lock(view.session)
-    assert view.session.document.locks == ()
+    assert view.session.document.grade.locks == ()
     next(a for a in menu.actions() if "stop" in a.text().lower()).trigger()
-    assert stop not in view.session.document.settings
+    assert stop not in view.session.document.grade.settings
 
 
 @pytest.mark.parametrize("name", sorted(path.name for path in GOLDEN.glob("v1_*.p4d.json")))
@@ -288,7 +288,7 @@ def test_every_kind_of_palette_is_drawn(qapp: QApplication, tmp_path: Path, name
     session.open_sidecar(shutil.copy(GOLDEN / name, tmp_path / "a.p4d.json"))
     document = session.document
     assert document is not None
-    for id_ in (*document.core.polytope.vertex_ids, *document.core.polytope.edge_ids):
+    for id_ in (*document.grade.core.polytope.vertex_ids, *document.grade.core.polytope.edge_ids):
         session.select(id_)
     for view, before in zip(views, empty, strict=True):
         assert view.grab().toImage() != before

@@ -102,7 +102,8 @@ def test_alt_click_is_a_hold_as_the_verb_makes_it(
     QTest.mouseClick(opened.viewer, Qt.MouseButton.LeftButton, alt, at)
     session = opened.session
     qtbot.waitUntil(
-        lambda: session.document is not None and len(session.document.picks) == 1, timeout=30_000
+        lambda: session.document is not None and len(session.document.grade.picks) == 1,
+        timeout=30_000,
     )
     assert session.save()
     words = ["edit", str(twin), "hold", "--frame", str(FRAME), "--pixel", f"{place.x},{place.y}"]

@@ -32,7 +32,7 @@ def test_versions_are_kept_used_and_compared(opened: Window, settle: Settle) -> 
     assert session.versions == ("A", "B")
     QTest.keyClick(opened, Qt.Key.Key_1)
     assert session.document is not None
-    assert session.document.colour(id_) == (1.0, 0.0, 0.0)
+    assert session.document.grade.colour(id_) == (1.0, 0.0, 0.0)
     opened.commands.compare_version()
     assert session.view.version == "B"  # A is what is shown
     settle(opened)
@@ -61,11 +61,11 @@ def test_undo_redo_and_the_history_by_hand(opened: Window) -> None:
         session.edit(lambda document, v=value: document.set(id_, rgb=(v, v, v)))
     QTest.keyClick(opened, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     assert session.document is not None
-    assert session.document.colour(id_) == (0.2, 0.2, 0.2)
+    assert session.document.grade.colour(id_) == (0.2, 0.2, 0.2)
     opened.history.go_to(1)
-    assert session.document.colour(id_) == (0.1, 0.1, 0.1)
+    assert session.document.grade.colour(id_) == (0.1, 0.1, 0.1)
     opened.history.go_to(3)
-    assert session.document.colour(id_) == (0.3, 0.3, 0.3)
+    assert session.document.grade.colour(id_) == (0.3, 0.3, 0.3)
 
 
 def test_a_window_closes_when_its_last_pick_is_followed(
@@ -85,7 +85,7 @@ def test_a_window_closes_when_its_last_pick_is_followed(
     assert opened.session.status.text == texts.STILL_FOLLOWING
     go_on.set()
     qtbot.waitUntil(lambda: not opened.isVisible())
-    assert Document.load(sidecar).colour(id_) == (0.3, 0.2, 0.1)
+    assert Document.load(sidecar).grade.colour(id_) == (0.3, 0.2, 0.1)
 
 
 def test_a_click_in_the_picture_brings_the_inspector(opened: Window, qtbot: Any) -> None:
@@ -163,7 +163,7 @@ def test_a_sidecar_that_cannot_be_written_is_kept_elsewhere(
     assert not opened.session.save()
     assert "no space" in opened.session.status.text
     assert not opened.session.saved
-    assert palette4d.load(next(recovery_files(sidecar))).colour(id_) == (1.0, 0.0, 0.0)
+    assert palette4d.load(next(recovery_files(sidecar))).grade.colour(id_) == (1.0, 0.0, 0.0)
     # Enter in the question of the closing window saves elsewhere.
     asked: list[str] = []
     monkeypatch.setattr(QMessageBox, "exec", lambda box: asked.append(box.defaultButton().text()))
@@ -174,7 +174,7 @@ def test_a_sidecar_that_cannot_be_written_is_kept_elsewhere(
     assert opened.isVisible()
     monkeypatch.setattr(sidecars, "write", write)
     assert opened.session.save()
-    assert palette4d.load(sidecar).colour(id_) == (1.0, 0.0, 0.0)
+    assert palette4d.load(sidecar).grade.colour(id_) == (1.0, 0.0, 0.0)
     assert not next(recovery_files(sidecar)).exists()
     # Saved elsewhere, nothing is lost, and the window closes.
     monkeypatch.setattr(sidecars, "write", full)
@@ -238,7 +238,7 @@ def test_a_field_gives_the_keyboard_back(opened: Window, name: str) -> None:
     assert session.document is not None
     id_ = busiest(opened)
     session.select(id_)
-    before = session.document.colour(id_)
+    before = session.document.grade.colour(id_)
     field = panel.hex if name == "hex" else panel.boxes[name]
     text = "#3366ff" if name == "hex" else "0.4"
 
@@ -249,16 +249,16 @@ def test_a_field_gives_the_keyboard_back(opened: Window, name: str) -> None:
     field.selectAll()
     QTest.keyClicks(field, text)
     QTest.keyClick(field, Qt.Key.Key_Return)
-    after = session.document.colour(id_)
+    after = session.document.grade.colour(id_)
     assert after != before
     assert not field.hasFocus()
     control, shift = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModifier
     press(Qt.Key.Key_Z, control)
-    assert session.document.colour(id_) == before
+    assert session.document.grade.colour(id_) == before
     # So it is in a field that has the keyboard, but no text that waits for Enter.
     field.setFocus()
     press(Qt.Key.Key_Z, control | shift)
-    assert session.document.colour(id_) == after
+    assert session.document.grade.colour(id_) == after
     QTest.keyClick(field, Qt.Key.Key_Return)
     press(Qt.Key.Key_Space)
     assert session.playing

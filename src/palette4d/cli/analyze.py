@@ -229,12 +229,12 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps({"sidecar": str(args.output)} | document.report | seconds, indent=2))
     elif not args.quiet:
         print("\n".join(analysis_report.lines(document, bars.seconds)))
-        colours = counted(len(document.tracks), "palette colour")
+        colours = counted(len(document.grade.tracks), "palette colour")
         handles = counted(len(document.fields()["polytope"]["vertices"]), "handle")
         print(f"wrote {args.output}: {colours} through time, {handles}")
         out = shlex.quote(str(args.output))
         print(f"next: palette4d plot {out} -o palette.png")
-        if args.like is not None and load(args.like).edited and not document.edited:
+        if args.like is not None and load(args.like).grade.edited and not document.grade.edited:
             print(f"      palette4d edit {out} copy {shlex.quote(str(args.like))}")
     return 0
 

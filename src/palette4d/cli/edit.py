@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from palette4d.grade.document import Document
+    from palette4d.grade.grade import Grade
     from palette4d.grade.handle_edits import How
 
 #: The words of `palette4d.grade.edits.RAMPS`, which would be slow to import for the help.
@@ -297,20 +298,20 @@ def run_set(args: argparse.Namespace) -> int:
         raise Palette4dError("found --near without --frame, expected the frame where it is seen")
     document = load(args.sidecar)
     before = _without_picks(document)
-    found = document.set_near(
-        args.near, frame=args.frame, anyway=args.anyway, any_value=args.any_value, **_how(args)
-    )
+    found = document.set_near(args.near, frame=args.frame, anyway=args.anyway, **_how(args))
     document.save()
     print(
         f"the palette colour nearest to {shown(args.near)} at frame {args.frame:g} is "
         f"{shown(found.rgb)} of {found.id}, {found.distance:.3f} away"
     )
     if found.handle is None:
-        _report(document, before)
+        _report(document.grade, before)
     else:
-        after = document.near(found.rgb if args.rgb is None else args.rgb, frame=args.frame).rgb
+        after = document.grade.near(
+            found.rgb if args.rgb is None else args.rgb, frame=args.frame
+        ).rgb
         at = f" at frame {args.frame:g}"
-        print(f"{document.named(found.handle)}: {shown(found.rgb)} -> {shown(after)}{at}")
+        print(f"{document.grade.named(found.handle)}: {shown(found.rgb)} -> {shown(after)}{at}")
     return 0
 
 
@@ -318,11 +319,9 @@ def run_adjust(args: argparse.Namespace) -> int:
     """Change a handle, a track or the palette."""
     document = load(args.sidecar)
     before = _without_picks(document)
-    document.adjust(
-        args.id, track=args.track, frame=args.frame, any_value=args.any_value, **_how(args)
-    )
+    document.adjust(args.id, track=args.track, frame=args.frame, **_how(args))
     document.save()
-    _report(document, before)
+    _report(document.grade, before)
     return 0
 
 
@@ -340,6 +339,7 @@ def _how(args: argparse.Namespace) -> How:
         "until": args.until,
         "fade": args.fade,
         "ramp": args.ramp,
+        "any_value": args.any_value,
     }
 
 
@@ -350,40 +350,40 @@ def run_ramp(args: argparse.Namespace) -> int:
         for id_ in args.ids or [None]:
             document.set_ramp(args.ramp, id_)
     document.save()
-    places = ", ".join(map(document.named, args.ids)) or "the clip"
+    places = ", ".join(map(document.grade.named, args.ids)) or "the clip"
     print(f"{places}: the ramp is {args.ramp}")
     return 0
 
 
-def _without_picks(document: Document) -> Document:
-    """Return the document as it is now, with the user's own colours only."""
-    return document.at({k: value for k, value in document.state.items() if k[0] != "pick"})
+def _without_picks(document: Document) -> Grade:
+    """Return the grade as it is now, with the user's own colours only."""
+    return document.grade.only("handle", "ramp", "lock")
 
 
-def _report(document: Document, old: Document) -> None:
+def _report(new: Grade, old: Grade) -> None:
     """Print the handles that have changed, with their colours before and after."""
     changed = [
         id_
-        for id_ in {**old.settings, **document.settings}
-        if old.settings.get(id_) != document.settings.get(id_)
+        for id_ in {**old.settings, **new.settings}
+        if old.settings.get(id_) != new.settings.get(id_)
     ]
     for id_ in changed[:MOST_LINES]:
-        if id_ not in document.settings and old.settings[id_].edge is not None:
+        if id_ not in new.settings and old.settings[id_].edge is not None:
             print(f"{old.named(id_)}: removed")
             continue
-        stop = document.settings.get(id_)
+        stop = new.settings.get(id_)
         if stop is not None and stop.edge is not None and id_ not in old.settings:
             was = old.colour(stop.edge, frame=stop.frame)
         else:
             was = old.colour(id_)
-        now = document.colour(id_)
+        now = new.colour(id_)
         how = "holds" if was == now else f"{shown(was)} ->"
-        print(f"{document.named(id_)}: {how} {shown(now)}")
+        print(f"{new.named(id_)}: {how} {shown(now)}")
     if len(changed) > MOST_LINES:
         print(f"and {len(changed) - MOST_LINES} more handles")
     if not changed:
         print("done")
-    if met := [pick.id for pick in document.picks if pick.enabled]:
+    if met := [pick.id for pick in new.picks if pick.enabled]:
         print(
             f"note: {', '.join(met)} {'is' if len(met) == 1 else 'are'} met as before: picked and "
             "held colours do not move with the palette. `change` or `disable` does that"
@@ -397,13 +397,13 @@ def run_move(args: argparse.Namespace) -> int:
     document = load(args.sidecar)
     lines = []
     if args.frame is not None:
-        lines.append(f"{document.named(args.id)} -> frame {args.frame:g}")
+        lines.append(f"{document.grade.named(args.id)} -> frame {args.frame:g}")
         document.move(args.id, frame=args.frame)
     if args.by is not None:
-        before = document.colour(args.id)
+        before = document.grade.colour(args.id)
         document.shift(args.id, by=args.by, any_value=args.any_value)
-        after = document.colour(args.id)
-        lines.append(f"{document.named(args.id)}: {shown(before)} -> {shown(after)}")
+        after = document.grade.colour(args.id)
+        lines.append(f"{document.grade.named(args.id)}: {shown(before)} -> {shown(after)}")
     document.save()
     print("\n".join(lines))
     return 0
@@ -412,11 +412,11 @@ def run_move(args: argparse.Namespace) -> int:
 def run_reset(args: argparse.Namespace) -> int:
     """Reset a vertex, remove a stop, or reset everything."""
     document = load(args.sidecar)
-    state, before = document.state, _without_picks(document)
+    state, before = document.grade.state, _without_picks(document)
     document.reset(args.id)
     document.save()
-    if document.state == state:
+    if document.grade.state == state:
         print("nothing to reset")
     else:
-        _report(document, before)
+        _report(document.grade, before)
     return 0

@@ -104,8 +104,12 @@ def run(args: argparse.Namespace) -> int:
 
 def _copied(path: Path, args: argparse.Namespace) -> str:
     document = load(path)
-    versions = document.versions
+    versions = document.grade.versions
     fit = document.copy_from(load(args.source), time=args.time)
     document.save()
-    kept = [f"; the edits before are version {v!r}" for v in document.versions if v not in versions]
+    kept = [
+        f"; the edits before are version {v!r}"
+        for v in document.grade.versions
+        if v not in versions
+    ]
     return f"{path.name}: {fit}{''.join(kept)}"

@@ -73,7 +73,7 @@ def _check_steps(wanted: int, there: int, what: str) -> None:
 def run_undo(args: argparse.Namespace) -> int:
     """Revert the last steps."""
     document = load(args.sidecar)
-    _check_steps(args.steps, len(document.history), "undo")
+    _check_steps(args.steps, len(document.history.done), "undo")
     steps = [document.undo() for _ in range(args.steps)]
     document.save()
     for step in steps:
@@ -84,7 +84,7 @@ def run_undo(args: argparse.Namespace) -> int:
 def run_redo(args: argparse.Namespace) -> int:
     """Apply the last undone steps again."""
     document = load(args.sidecar)
-    _check_steps(args.steps, len(document.undone), "redo")
+    _check_steps(args.steps, len(document.history.undone), "redo")
     steps = [document.redo() for _ in range(args.steps)]
     document.save()
     for step in steps:
@@ -95,7 +95,7 @@ def run_redo(args: argparse.Namespace) -> int:
 def run_history(args: argparse.Namespace) -> int:
     """List or forget the steps."""
     document = load(args.sidecar)
-    done, undone = document.history, document.undone
+    done, undone = document.history.done, document.history.undone
     if args.clear:
         document.forget_history()
         document.save()
@@ -119,11 +119,11 @@ def run_version(args: argparse.Namespace) -> int:
     """Save, list, use or remove a version."""
     document = load(args.sidecar)
     if args.what == "list":
-        active = set(document.same_edits())
-        for name in document.versions:
+        active = set(document.grade.same_edits)
+        for name in document.grade.versions:
             mark = "*" if name in active else " "
             print(f"{mark} {name}")
-        if not document.versions:
+        if not document.grade.versions:
             print("no versions")
         return 0
     if args.what == "save":

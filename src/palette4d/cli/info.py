@@ -72,14 +72,14 @@ def info_of(document: "Document") -> dict[str, Any]:
 
     fields = document.fields()
     clip, polytope = fields["clip"], fields["polytope"]
-    tracks = document.tracks
-    shares = track_shares(ClipColours(document.core.polytope, fields), tracks)
+    tracks = document.grade.tracks
+    shares = track_shares(ClipColours(document.grade.core.polytope, fields), tracks)
     frames = clip["frames"]
     edited = {entry["vertex"]: entry["rgb"] for entry in fields["edits"]["vertices"]}
     stops = fields["edits"]["stops"]
     stages = fields["quality"]["stages"]
     vertices = polytope["vertices"]
-    names = document.names
+    names = document.grade.names
     on_edge: dict[str, list[str]] = {edge["id"]: [] for edge in polytope["edges"]}
     for stop in stops:
         on_edge[stop["edge"]].append(stop["id"])
@@ -87,7 +87,7 @@ def info_of(document: "Document") -> dict[str, Any]:
     @functools.lru_cache(64)  # tracks share their frames
     def palette_of(frame: float) -> tuple["Palette", dict[str, list[int]]]:
         """Return a palette, and where in it ids and ends of edges are."""
-        palette, places = document.palette(frame), dict[str, list[int]]()
+        palette, places = document.grade.palette(frame), dict[str, list[int]]()
         for at, (id_, ends) in enumerate(zip(palette.ids, palette.ends, strict=True)):
             for each in {id_, *ends}:
                 places.setdefault(each, []).append(at)
@@ -110,12 +110,12 @@ def info_of(document: "Document") -> dict[str, Any]:
         "blocks": len(polytope["blocks"]),
         "stops": len(stops),
         "edited_vertices": len(edited),
-        "ramp": document.ramp,
+        "ramp": document.grade.ramp,
         "picks": len(fields["edits"].get("picks", [])),
         "edit": fields["extra"].get("edit"),
         "locks": fields["edits"].get("locks", []),
-        "versions": list(document.versions),
-        "steps": len(document.history),
+        "versions": list(document.grade.versions),
+        "steps": len(document.history.done),
         "tracks": [
             {**_track(document, track, on_edge, palette_of), **_share(shares.get(track.name))}
             for track in tracks
@@ -144,12 +144,12 @@ def _track(
     palette_of: "Callable[[float], tuple[Palette, dict[str, list[int]]]]",
 ) -> dict[str, Any]:
     """Return a track with its edited handles, and its colours where they change most."""
-    edited = [id_ for id_ in track.vertices if id_ in document.settings]
+    edited = [id_ for id_ in track.vertices if id_ in document.grade.settings]
     edited += [id_ for edge in track.edges for id_ in on_edge[edge]]
     inside = {*track.vertices, *track.edges}
     found = []
     frames = [track.at, track.first]
-    for frame in [*frames, *(document.frame_of(id_) for id_ in edited)]:
+    for frame in [*frames, *(document.grade.frame_of(id_) for id_ in edited)]:
         palette, places = palette_of(float(frame))
         few = inside if len(inside) < len(places) else [id_ for id_ in places if id_ in inside]
         for at in sorted({at for id_ in few for at in places.get(id_, ())}):

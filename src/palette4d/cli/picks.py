@@ -290,7 +290,6 @@ def run_pick(args: argparse.Namespace) -> int:
 def run_change(args: argparse.Namespace) -> int:
     """Change a pick or hold."""
     document = load(args.sidecar)
-    old = next((pick for pick in document.picks if pick.id == args.id), None)
     parts = ("frame", "to", *_RANGE, *_MATTE, "toward", "follow")
     changes: dict[str, Any] = {
         name: value for name in parts if (value := getattr(args, name)) is not None
@@ -298,10 +297,7 @@ def run_change(args: argparse.Namespace) -> int:
     box = _box(args)
     with frames_bar("following", hidden=False) as progress:
         if args.pixel is not None:
-            changes |= {"pixel": args.pixel, "box": box or 1}
-            changes["rgb"] = document.colour_of_pixel(
-                changes.get("frame", old.frame if old else 0.0), args.pixel, box or 1, args.clip
-            )
+            changes |= {"pixel": args.pixel, "box": box}
         elif args.colour is not None:
             changes |= {"rgb": args.colour, "pixel": None, "box": None}
         if args.by is not None:
@@ -337,7 +333,7 @@ def run_lock(args: argparse.Namespace) -> int:
     document = load(args.sidecar)
     (document.lock if args.action == "lock" else document.unlock)(*args.ids)
     document.save()
-    print(f"{args.action}ed: {', '.join(map(document.named, dict.fromkeys(args.ids)))}")
+    print(f"{args.action}ed: {', '.join(map(document.grade.named, dict.fromkeys(args.ids)))}")
     return 0
 
 
@@ -349,11 +345,11 @@ def run_picks(args: argparse.Namespace) -> int:
         listed = {"picks": edits.get("picks", []), "locks": edits.get("locks", [])}
         print(json.dumps(listed, allow_nan=False))
         return 0
-    for pick in document.picks:
+    for pick in document.grade.picks:
         print(_told(document, pick))
-    if document.locks:
-        print(f"locked: {', '.join(map(document.named, document.locks))}")
-    if not document.picks and not document.locks:
+    if document.grade.locks:
+        print(f"locked: {', '.join(map(document.grade.named, document.grade.locks))}")
+    if not document.grade.picks and not document.grade.locks:
         print("no picks, holds or locks")
     return 0
 
@@ -365,14 +361,14 @@ def _print_pick(
     clip: str | None = args.clip
     for line in document.pick_warnings(id_, clip):
         tell(args, "warning", line)
-    found = next(pick for pick in document.picks if pick.id == id_)
+    found = next(pick for pick in document.grade.picks if pick.id == id_)
     print(_told(document, found, followed))
     answer = document.answer(id_, clip) if found.enabled else None
     for line in () if answer is None else answer.lines(id_):
         print(f"  {line}")
     if found.kind == "pick":
         return
-    for pick in document.picks:  # what the hold leaves of them
+    for pick in document.grade.picks:  # what the hold leaves of them
         if pick.kind == "pick" and pick.enabled:
             left = document.answer(pick.id, clip, tries=False)
             for line in () if left is None else left.lines(pick.id):
@@ -390,7 +386,7 @@ def _told(document: Document, pick: Pick, followed: bool = False) -> str:
         lines[0] += f"; from {start} until {until}{fade}"
     if not pick.enabled:
         return f"{lines[0]}; disabled"
-    if not pick.covers(pick.frame, document.frames[2]):
+    if not pick.covers(pick.frame, document.grade.frames[2]):
         lines.append(f"  note: frame {pick.frame:g} is outside of its range and does not change")
     if pick.path:
         lines += _path(pick)
@@ -402,7 +398,7 @@ def _told(document: Document, pick: Pick, followed: bool = False) -> str:
                 f"--pixel X,Y --with {pick.id}"
             )
     else:
-        source = document.core.clip["source"]
+        source = document.grade.core.clip["source"]
         why = f": the clip {source!r} was not found; give it with --clip" if followed else ""
         lines.append(f"  is at the same colour in all frames{why}")
     if pick.kind == "pick" and not pick.whole_hue and pick.matte is None:

@@ -100,6 +100,6 @@ def run(args: argparse.Namespace) -> int:
 def _compared(document: "Document", names: str) -> tuple[str, str]:
     """Return the names of two versions; "" is the active edits."""
     first, _, second = names.partition(",")
-    if names in document.versions:  # a name with a comma
+    if names in document.grade.versions:  # a name with a comma
         return names, ""
     return first.strip(), second.strip()

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     frames = [args.frame] if args.frames is None else _frames(args.frames, document)
     separator = "[" if args.frames is not None else ""
     for frame in frames:
-        palette = document.palette(frame)
+        palette = document.grade.palette(frame)
         if args.frames is None and palette.frame != args.frame:
             print(
                 f"palette4d: frame {args.frame:g} is outside of the clip; this is frame "
@@ -82,12 +82,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _frames(text: str, document: Document) -> Sequence[int]:
-    first, last, step = document.frames
+    first, last, step = document.grade.frames
     if text == "all":
         return frames_between(first, last, step)
     frames = parse_frames(text)
     for end in (frames[0], frames[-1]):
-        document.check_frame(end)
+        document.grade.check_frame(end)
     return frames
 
 

@@ -61,6 +61,11 @@ def make_folder(folder: Path) -> None:
         ) from error
 
 
+def same_file(a: Path, b: Path) -> bool:
+    """Return whether two paths lead to one file."""
+    return os.path.realpath(a) == os.path.realpath(b)
+
+
 def link_target(path: str | os.PathLike[str]) -> Path:
     """Return the target of a symbolic link, or the path itself.
 

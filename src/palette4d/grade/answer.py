@@ -1,13 +1,12 @@
 """What a pick takes of its frame, what else it takes, and which gesture would help.
 
-Input: a document with a pick, and its clip. Output: an `Answer`. Proposed holds and boxes have been
-tried on a copy of the document.
+Input: a grade with a pick, and its clip. Output: an `Answer`. Proposed holds and boxes have been
+tried.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +14,13 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import hex_of, percent
+from palette4d.grade import pick_edits
+from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.edits import Colour, as_colour
+from palette4d.grade.grade import Grade
 from palette4d.grade.mattes import Display, display_curve
 from palette4d.grade.picks import Area, Pick
 from palette4d.media.source_clip import nearest_frame
-
-if TYPE_CHECKING:
-    from palette4d.grade.clip_of_picks import ClipOfPicks
-    from palette4d.grade.pick_edits import PickEdits
 
 F32 = NDArray[np.float32]
 B = NDArray[np.bool_]
@@ -134,9 +132,7 @@ class Answer:
         return found
 
 
-def of(
-    document: PickEdits, pick: Pick, of_clip: ClipOfPicks, *, tries: bool = True
-) -> Answer | None:
+def of(grade: Grade, pick: Pick, of_clip: ClipOfPicks, *, tries: bool = True) -> Answer | None:
     """Return the answer for a pick; None where the clip is not there.
 
     Without `tries` no hold and no box are proposed, which takes most of the time.
@@ -145,8 +141,8 @@ def of(
     if clip is None:
         return None
     frame = nearest_frame(clip, pick.frame)
-    view = _View.of(document, of_clip, frame)
-    taken = view.taken(document, pick)
+    view = _View.of(grade, of_clip, frame)
+    taken = view.taken(grade, pick)
     share = float(taken.mean())
     if pick.kind == "hold":
         return Answer(frame, share)
@@ -160,24 +156,25 @@ def of(
     if beside > OTHERS:
         found = replace(found, other=view.place(others))
         if tries:
-            found = replace(found, hold=_hold(document, pick, of_clip, view, own, others))
+            found = replace(found, hold=_hold(grade, pick, of_clip, view, own, others))
     part = view.beside(pick, own, taken)
     if tries and part.mean() > max(PART, 0.1 * share) and not pick.whole_hue:
-        found = replace(found, part=_part(document, pick, of_clip, view, part, beside))
+        found = replace(found, part=_part(grade, pick, of_clip, view, part, beside))
     return found
 
 
 def _hold(
-    document: PickEdits, pick: Pick, of_clip: ClipOfPicks, view: _View, own: B, others: B
+    grade: Grade, pick: Pick, of_clip: ClipOfPicks, view: _View, own: B, others: B
 ) -> Place | None:
     """Return a hold on the largest other thing, if it helps and spares the picked thing."""
     place = view.place(others)
-    trial = document.trial_of_picks(of_clip)
     try:
-        trial.hold(view.frame, pixel=place.pixel, box=place.box, follow=False)
+        trial, _ = pick_edits.hold(
+            grade, of_clip, view.frame, pixel=place.pixel, box=place.box, follow=False
+        )
     except Palette4dError:
         return None
-    taken = view.taken(trial, next(p for p in trial.picks if p.id == pick.id))
+    taken = view.taken(trial, trial.pick(pick.id))
     left = float((taken & others).mean())
     if left > 0.5 * others.mean() or (taken & own).sum() < (1 - COST) * own.sum():
         return None
@@ -185,17 +182,16 @@ def _hold(
 
 
 def _part(
-    document: PickEdits, pick: Pick, of_clip: ClipOfPicks, view: _View, part: B, beside: float
+    grade: Grade, pick: Pick, of_clip: ClipOfPicks, view: _View, part: B, beside: float
 ) -> Place | None:
     """Return a second box, if it adds the part and little else."""
     place = view.place(part)
-    trial = document.trial_of_picks(of_clip)
     area = Area(view.frame, (place.pixel,), place.box / 2)
     try:
-        trial.add_area(pick.id, area)
+        trial = pick_edits.add_area(grade, of_clip, pick.id, area)
     except Palette4dError:
         return None
-    grown = next(p for p in trial.picks if p.id == pick.id)
+    grown = trial.pick(pick.id)
     taken = view.taken(trial, grown)
     others = taken & ~_connected(taken, view.seeds(grown, view.frame))
     if (taken & part).sum() < 0.5 * part.sum() or others.mean() > beside + OTHERS:
@@ -214,17 +210,17 @@ class _View:
     display: Display | None
 
     @classmethod
-    def of(cls, document: PickEdits, of_clip: ClipOfPicks, frame: int) -> _View:
+    def of(cls, grade: Grade, of_clip: ClipOfPicks, frame: int) -> _View:
         pixels = of_clip.read(frame)
         every = max(1, round(pixels.shape[1] / WIDTH))
         rgb = np.ascontiguousarray(pixels[every // 2 :: every, every // 2 :: every])
         real = np.asarray(np.isfinite(rgb).all(axis=2))
         shown = np.where(real[..., None], rgb, 0).astype(np.float32)
-        return cls(frame, every, shown, real, display_curve(document.encoding))
+        return cls(frame, every, shown, real, display_curve(grade.encoding))
 
-    def taken(self, document: PickEdits, pick: Pick) -> B:
+    def taken(self, grade: Grade, pick: Pick) -> B:
         """Return which pixels get at least a quarter of a pick's change."""
-        picks = document.core.pick_matte_at(pick.id, self.frame)
+        picks = grade.core.pick_matte_at(pick.id, self.frame)
         return self._drawn(picks) & self.real
 
     def _drawn(self, picks: _core.FramePicks) -> B:

@@ -18,6 +18,7 @@ from palette4d.common.text import hex_of
 from palette4d.grade import follow
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.follow import Progress
+from palette4d.grade.grade import Grade
 from palette4d.grade.mattes import Display, Learned, learn
 from palette4d.grade.picks import ALIKE, PathKey, Pick
 from palette4d.media.clip_base import describe
@@ -71,6 +72,12 @@ class ClipOfPicks:
         self._sidecar, self._given = sidecar or Path("unsaved.p4d.json"), given
         self._read: dict[int, F32] = {}
         self._clip: Clip | None = None
+
+    @classmethod
+    def of(cls, grade: Grade, given: Given = None) -> ClipOfPicks:
+        """Return the clip of a grade, or the user's."""
+        own = grade.analysed.conversion
+        return cls(grade.members["clip"], None if own is None else own.steps, grade.path, given)
 
     def open(self) -> Clip | None:
         """Return the clip, or None if none was given and the sidecar's clip is not there.

@@ -6,22 +6,24 @@ again from the target's clip: there their colour is, connected, or they are not 
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from palette4d import _core
 from palette4d.colour.encoding_conversion import between
 from palette4d.common.arguments import frames_between
 from palette4d.common.errors import Palette4dError
-from palette4d.grade import edits
-from palette4d.grade.edits import Key, Setting, as_colour
+from palette4d.common.files import same_file
+from palette4d.grade import recolouring
+from palette4d.grade.clip_of_picks import ClipOfPicks
+from palette4d.grade.edits import Colour, Key, Setting, as_colour, new_id
+from palette4d.grade.grade import Grade
+from palette4d.grade.pick_edits import taken
 from palette4d.grade.picks import Pick
-
-if TYPE_CHECKING:
-    from palette4d.grade.document import Document
+from palette4d.grade.versions import with_active_kept
 
 F64 = NDArray[np.float64]
 Time = Literal["relative"] | float
@@ -91,10 +93,10 @@ class Fit:
 
 @dataclass(frozen=True)
 class Match:
-    """The times and the colours of two documents."""
+    """The times and the colours of two grades."""
 
-    target: "Document"
-    source: "Document"
+    target: Grade
+    source: Grade
     time: Time
 
     def there(self, frame: float) -> float:
@@ -118,39 +120,34 @@ class Match:
 
 
 def copied(
-    target: "Document", source: "Document", time: Time = "relative"
-) -> tuple[dict[Key, Any], list[Pick]]:
-    """Return the state of a document with the handles of another document, and its picks there.
-
-    Parameters
-    ----------
-    target, source : Document
-        The documents.
-    time : "relative" or float
-        "relative": the first frame gets the look of the first frame, the last that of the last. A
-        frame: all frames get the look of this frame of the source.
-
-    Raises
-    ------
-    Palette4dError
-        The frame is outside of the source's clip, or no config converts between the colour spaces.
-    """
+    target: Grade, source: Grade, of_clip: ClipOfPicks, time: Time = "relative"
+) -> tuple[Grade, Fit]:
+    """Take over the grade of another palette (`Document.copy_from`); return also how it fits."""
+    if source.path is not None and target.path is not None and same_file(source.path, target.path):
+        raise Palette4dError(
+            f"{source.name} is the palette itself, which has this grade already; expected "
+            "another palette to copy from"
+        )
+    if not source.edited:
+        raise Palette4dError(f"{source.name} has no edits; expected a graded palette to copy from")
     match = _match(target, source, time)
-    state: dict[Key, Any] = dict(_handles(target, _grade(match, _handles_of(source))))
+    state = dict(_handles(target, _grade(match, _handles_of(source))))
+    kept, _ = with_active_kept(target, "before copy")
+    after = kept.with_state({**kept.of_kind("version", "lock"), **state})
     into = between(source.encoding, target.encoding, _configs(target, source))
-    picks = [value for (kind, _), value in source.state.items() if kind == "pick"]
-    found = (_pick(match, pick, into) for pick in picks)
-    return state, [Pick.from_fields(pick) for pick in found if pick is not None]
+    picks = (_pick(match, pick, into) for pick in source.picks)
+    after, left_out = taken(after, of_clip, [pick for pick in picks if pick is not None])
+    label = f"copy the grade of {source.members['clip']['name']}"
+    return after.labelled(label), replace(fit(after, source, time), left_out=tuple(left_out))
 
 
-def _handles_of(source: "Document") -> "Document":
-    """Return a document with the edits of the handles alone."""
-    own = {key: value for key, value in source.state.items() if key[0] in ("handle", "ramp")}
-    return source.at(own)
+def _handles_of(grade: Grade) -> Grade:
+    """Return a grade with the edits of the handles alone."""
+    return grade.only("handle", "ramp")
 
 
-def fit(target: "Document", source: "Document", time: Time = "relative") -> Fit:
-    """Measure how near the handles' grade of a document is to that of another on its colours."""
+def fit(target: Grade, source: Grade, time: Time = "relative") -> Fit:
+    """Measure how near the handles' grade is to that of another palette on its colours."""
     match = _match(target, source, time)
     target, source = _handles_of(target), _handles_of(source)
     graded = _grade(match, source)
@@ -180,7 +177,7 @@ def fit(target: "Document", source: "Document", time: Time = "relative") -> Fit:
     return Fit(mean[0], mean[1], float(worst), mean[2])
 
 
-def _match(target: "Document", source: "Document", time: Time) -> Match:
+def _match(target: Grade, source: Grade, time: Time) -> Match:
     if time != "relative":
         if isinstance(time, str):
             raise Palette4dError(f"found the time {time!r}, expected 'relative' or a frame")
@@ -188,20 +185,20 @@ def _match(target: "Document", source: "Document", time: Time) -> Match:
     return Match(target, source, time)
 
 
-def _configs(*documents: "Document") -> Iterator[str]:
-    for document in documents:
-        name = document.fields()["clip"].get("conversion", {}).get("config")
+def _configs(*grades: Grade) -> Iterator[str]:
+    for grade in grades:
+        name = grade.members["clip"].get("conversion", {}).get("config")
         if name:
             yield name
 
 
-def _recoloured(document: "Document", colours: F64, frame: float) -> F64:
+def _recoloured(grade: Grade, colours: F64, frame: float) -> F64:
     image = np.asarray(colours, dtype=np.float32)[None]
-    result: F64 = document.recolour(image, frame, space="palette")[0].astype(np.float64)
+    result: F64 = recolouring.recolour(grade, image, frame, space="palette")[0].astype(np.float64)
     return result
 
 
-def _grade(match: Match, source: "Document") -> Callable[[F64, float], F64]:
+def _grade(match: Match, source: Grade) -> Callable[[F64, float], F64]:
     """Return what the source's grade makes of (n, 3) colours of the target at a target's time."""
     configs = tuple(_configs(match.target, match.source))
     there = between(match.target.encoding, match.source.encoding, configs)
@@ -220,11 +217,9 @@ def _grade(match: Match, source: "Document") -> Callable[[F64, float], F64]:
     return graded
 
 
-def _handles(
-    target: "Document", graded: Callable[[F64, float], F64]
-) -> Iterator[tuple[Key, Setting]]:
+def _handles(target: Grade, graded: Callable[[F64, float], F64]) -> Iterator[tuple[Key, Setting]]:
     """Yield the settings of vertices, and of the stops that edges need."""
-    polytope = target.fields()["polytope"]
+    polytope = target.members["polytope"]
     vertices = {vertex["id"]: vertex for vertex in polytope["vertices"]}
     taken = {*vertices, *(edge["id"] for edge in polytope["edges"])}
     shifts: dict[str, F64] = {}
@@ -248,7 +243,7 @@ def _handles(
         ends = [(vertices[edge[end]]["frame"], shifts[edge[end]]) for end in ("from", "to")]
         for index in _needed(ends, [(frame, new - old) for frame, old, new in samples]):
             frame, _, new = samples[index]
-            id_ = edits.new_id("s", taken)
+            id_ = new_id("s", taken)
             taken.add(id_)
             yield ("handle", id_), Setting(as_colour(new.tolist()), edge["id"], frame)
 
@@ -273,48 +268,47 @@ def _needed(ends: list[tuple[float, F64]], samples: list[tuple[float, F64]]) -> 
     return sorted(chosen)
 
 
-def _pick(match: Match, pick: dict[str, Any], into: Any) -> dict[str, Any] | None:
+def _pick(match: Match, pick: Pick, into: Callable[[F64], F64] | None) -> Pick | None:
     """Return a pick as it is in the target, or None if it does nothing at the chosen frame."""
 
-    def colour(rgb: Any) -> list[float]:
-        return list(as_colour(rgb if into is None else into(rgb).tolist()))
+    def colour(rgb: ArrayLike) -> Colour:
+        own = np.array(rgb, float)
+        return as_colour((own if into is None else into(own)).tolist())
 
     def time(frame: float) -> int:
         first, last, step = match.target.frames
         nearest = first + step * round((match.back(frame) - first) / step)
         return min(max(nearest, first), last)
 
-    # Of the other clip:
-    left_out = ("pixel", "box", "areas", "path", "from", "until", "fade", "matte")
-    found = {name: value for name, value in pick.items() if name not in left_out}
-    if "to" in pick:
-        found["to"] = colour(pick["to"])
-    path = pick.get("path", ())
+    # What is of the other clip is left out.
+    found = replace(pick, pixel=None, box=None, areas=(), path=(), matte=None)
+    found = replace(found, start=None, until=None, fade=0.0)
+    if pick.to is not None:
+        found = replace(found, to=colour(pick.to))
     if match.time == "relative":
-        found |= {"frame": time(pick["frame"]), "rgb": colour(pick["rgb"])}
-        found |= {name: time(pick[name]) for name in ("from", "until") if name in pick}
-        if pick.get("fade"):
-            found["fade"] = pick["fade"] * match.pace
-        if path:
-            keys = {
-                frame: {**key, "frame": frame, "rgb": colour(key["rgb"])}
-                for key, frame in ((key, time(key["frame"])) for key in path)
-            }
-            found["path"] = [keys[frame] for frame in sorted(keys)]
-        return found
+        keys = {time(key.frame): key for key in pick.path}
+        return replace(
+            found,
+            frame=time(pick.frame),
+            rgb=colour(pick.rgb),
+            start=None if pick.start is None else time(pick.start),
+            until=None if pick.until is None else time(pick.until),
+            fade=pick.fade * match.pace,
+            path=tuple(replace(keys[f], frame=f, rgb=colour(keys[f].rgb)) for f in sorted(keys)),
+        )
     at = float(match.time)
-    if not pick.get("from", at) <= at <= pick.get("until", at):
+    start, until = (at if end is None else end for end in (pick.start, pick.until))
+    if not start <= at <= until:
         return None
-    asked = Pick.from_fields(pick)
-    rgb = asked.colour_at(at)
-    if asked.to is not None and asked.toward == "shift":
-        found["to"] = colour((rgb + asked.change_at(at)).tolist())
-    return {**found, "frame": match.target.frames[0], "rgb": colour(rgb.tolist())}
+    rgb = pick.colour_at(at)
+    if pick.to is not None and pick.toward == "shift":
+        found = replace(found, to=colour(rgb + pick.change_at(at)))
+    return replace(found, frame=match.target.frames[0], rgb=colour(rgb))
 
 
-def _colours(target: "Document") -> Iterator[tuple[float, F64, F64]]:
+def _colours(target: Grade) -> Iterator[tuple[float, F64, F64]]:
     """Yield frames with colours of the target's clip and their weights."""
-    stored = target.fields().get("colours")
+    stored = target.members.get("colours")
     if stored:
         for entry in stored:
             rows = np.array(entry["rgbw"], dtype=np.float64).reshape(-1, 4)

@@ -1,46 +1,61 @@
-"""The document: a palette and the user's edits. It is loaded, edited, applied and saved.
+"""The document: a grade, the steps that led to it, and its file.
 
-The steps of an edit are part of the document and are saved with it. The core computes every colour,
-so that results equal the node's bit by bit.
+It is loaded, edited, applied and saved. Edits are the functions of `handle_edits`, `pick_edits`,
+`versions` and `copying`: each takes a grade and gives the grade after it, which becomes a step.
 """
 
-import copy
-import itertools
+import contextlib
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Generator, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, Unpack
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
-from palette4d.common.files import link_target
+from palette4d.common.files import link_target, same_file
 from palette4d.common.locking import locked
 from palette4d.common.text import counted
-from palette4d.grade import edits, sidecar
-from palette4d.grade.copying import Fit, Time, copied, fit
-from palette4d.grade.edits import Key, State
-from palette4d.grade.handle_edits import HandleEdits
-from palette4d.grade.pick_edits import PickEdits
-from palette4d.grade.sidecar import Fields, OnEdits
-from palette4d.grade.steps import ACTIVE
+from palette4d.grade import (
+    answer,
+    copying,
+    edits,
+    handle_edits,
+    pick_edits,
+    reanalysis,
+    recolouring,
+    sidecar,
+    versions,
+)
+from palette4d.grade.clip_of_picks import ClipOfPicks
+from palette4d.grade.edits import Edit
+from palette4d.grade.follow import Progress
+from palette4d.grade.grade import Grade
+from palette4d.grade.handle_edits import How
+from palette4d.grade.history import File, History, merged
+from palette4d.grade.members import Fields, bounded, history_of
+from palette4d.grade.palette import Near
+from palette4d.grade.pick_edits import Asked, When, Where
+from palette4d.grade.picks import Area, Pick
+from palette4d.grade.recolouring import F32
+from palette4d.grade.sidecar import OnEdits
 
-#: The most characters of a version's name.
-LONGEST_NAME = 100
+PathLike = str | os.PathLike[str]
 
 
-class Document(HandleEdits, PickEdits):
+class Document:
     """A clip's palette with its edits.
 
-    Get one with `palette4d.load` or `palette4d.analyze`. Colours are code values of the palette
-    (``encoding`` says which); 0..1 is the usual range, and any finite value is allowed. Frames are
-    the clip's frame numbers; fractions are times between frames. A method that fails raises
-    `Palette4dError` and changes nothing.
+    Get one with `palette4d.load` or `palette4d.analyze`. Colours are three code values of the
+    palette or "#rrggbb"; 0..1 is the usual range, and any finite value is allowed. Integers of 8
+    bits or more, such as 255 128 0, are refused unless `any_value` is true. Frames are the clip's
+    frame numbers; fractions are times between frames. A method that fails raises `Palette4dError`
+    and changes nothing.
 
     Parameters
     ----------
-    fields : mapping
-        The members of a sidecar (docs/sidecar.md).
+    content : mapping or Grade
+        The members of a sidecar (docs/sidecar.md), or a grade.
     notes : iterable of str
         Notes of the analysis about the palette.
     report : mapping, optional
@@ -48,8 +63,10 @@ class Document(HandleEdits, PickEdits):
 
     Attributes
     ----------
-    path : Path or None
-        The sidecar; None until it is saved.
+    grade : Grade
+        The palette and its edits, as they are now: a value that never changes.
+    history : History
+        The steps that led there.
     notes : tuple of str
         As above.
     report : dict
@@ -58,19 +75,22 @@ class Document(HandleEdits, PickEdits):
 
     def __init__(
         self,
-        fields: Mapping[str, Any],
+        content: Mapping[str, Any] | Grade,
         notes: Iterable[str] = (),
         report: Mapping[str, Any] | None = None,
     ) -> None:
-        self.path: Path | None = None
-        core, data = _core.encode_sidecar(fields, self._name)
-        self._start(core, sidecar.decoded(data, self._name)[1])
-        self._disk = None
+        if isinstance(content, Grade):
+            self.grade, self.history = content, History()
+        else:
+            core, _ = _core.encode_sidecar(content, "<document>")
+            fields = sidecar.up_to_date(_core.plain(content))
+            self.grade, self.history = _read(core, fields, None)
+        self._file: File | None = None
         self.notes = tuple(notes)
         self.report = dict(report or {})
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str], *, version: str = "") -> "Document":
+    def load(cls, path: PathLike, *, version: str = "") -> "Document":
         """Load a sidecar (*.p4d.json), or a version in it (`Document.version`).
 
         Raises
@@ -80,28 +100,308 @@ class Document(HandleEdits, PickEdits):
         Palette4dError
             There is no such version.
         """
-        document = cls.__new__(cls)
         data = sidecar.read_bytes(path)
-        document._disk, document.path, document.notes = data, Path(path), ()
-        document.report = {}
-        document._start(*sidecar.decoded(data, os.fspath(path)))
+        grade, history = _read(*sidecar.decoded(data, os.fspath(path)), Path(path))
+        document = cls(grade)
+        document._saved(grade, history, data)
         return document.version(version)
+
+    def _saved(self, grade: Grade, history: History, data: bytes) -> None:
+        self.grade, self.history = grade, history
+        self._file = File(data, grade.state, history)
 
     def __repr__(self) -> str:
         """Return one line: the clip, its frames, and the numbers of edits."""
-        first, last, _ = self.frames
+        grade, (first, last, _) = self.grade, self.grade.frames
         return (
-            f"<Document {self._fields['clip']['name']!r}: frames {first} to {last}, "
-            f"{counted(len(self._handles.vertices), 'vertex', 'vertices')}, "
-            f"{counted(sum(kind in ACTIVE for kind, _ in self._state), 'edit')}>"
+            f"<Document {grade.members['clip']['name']!r}: frames {first} to {last}, "
+            f"{counted(len(grade.handles.vertices), 'vertex', 'vertices')}, "
+            f"{counted(len(grade.active), 'edit')}>"
         )
+
+    # -------------------------------------------------------------------------------------- steps
+
+    def apply(self, edit: Edit) -> None:
+        """Apply an edit as one step, which `undo` reverts; an edit without change is no step.
+
+        Versions that it makes are no part of the step: they stay when it is undone.
+        """
+        self._take(self.grade.after(edit))
+
+    def _take(self, after: Grade) -> None:
+        """Go on with the grade after an edit; what it changes is one step."""
+        step = edits.difference(self.grade.state, after.state, after.label).undoable()
+        self.grade, self.history = after, self.history.with_step(step)
+
+    @contextlib.contextmanager
+    def one_step(self, label: str) -> Generator[None]:
+        """Make all edits in a ``with`` block one step; an error in it reverts them all."""
+        grade, history = self.grade, self.history
+        try:
+            yield
+        except BaseException:
+            self.grade, self.history = grade, history
+            raise
+        after, self.grade, self.history = self.grade, grade, history
+        self._take(after.labelled(label))
+
+    def undo(self) -> Edit:
+        """Revert the last step, and return it. Steps of earlier sessions can be reverted too."""
+        self.grade, self.history, step = self.history.back(self.grade)
+        return step
+
+    def redo(self) -> Edit:
+        """Apply the last undone step again, and return it."""
+        self.grade, self.history, step = self.history.forth(self.grade)
+        return step
+
+    def forget_history(self) -> None:
+        """Drop all steps, done and undone; the edits stay."""
+        self.history = History()
+
+    # ------------------------------------------------------------------------------------ handles
+
+    def set(self, id: str, *, rgb: Iterable[float] | str, any_value: bool = False) -> None:
+        """Set the colour of a vertex or a stop."""
+        new = self.grade.checked(rgb, any_value)
+        self._take(handle_edits.set_colour(self.grade, id, new))
+
+    def stop(
+        self, edge: str, *, frame: float, rgb: Iterable[float] | str, any_value: bool = False
+    ) -> str:
+        """Set the colour of an edge at a time by a colour stop; return the stop's id.
+
+        An existing stop at that time gets the colour.
+        """
+        new = self.grade.checked(rgb, any_value)
+        after, id_ = handle_edits.stop(self.grade, edge, frame, new)
+        self._take(after)
+        return id_
+
+    def set_near(
+        self,
+        near: Iterable[float] | str,
+        *,
+        frame: float,
+        anyway: bool = False,
+        **how: Unpack[How],
+    ) -> Near:
+        """Change the palette colour nearest to a given colour at a frame.
+
+        The stop at that time moves, or a vertex less than a frame step away, so that the colour at
+        the frame is exactly the new one. Otherwise a stop is added.
+
+        Parameters
+        ----------
+        near : 3 floats or "#rrggbb"
+            The visible colour, after the edits so far.
+        frame : float
+            The time; within the clip.
+        anyway : bool
+            Edit the palette colour even if it is more than 0.25 away.
+        **how
+            The change, as in `adjust`: ``rgb=``, or others; ``any_value=``.
+
+        Returns
+        -------
+        Near
+            The palette colour and its distance; `handle` is the vertex or stop that now has the
+            colour, or None after the change of a range.
+
+        Raises
+        ------
+        Palette4dError
+            The nearest palette colour is more than 0.25 away; the message names the palette colours
+            that `near` is mixed from.
+        """
+        after, found = handle_edits.set_near(self.grade, near, frame=frame, anyway=anyway, **how)
+        self._take(after)
+        return found
+
+    def shift(self, id: str, *, by: Iterable[float], any_value: bool = False) -> None:
+        """Add three offsets to the colour of a vertex or a stop."""
+        offset = self.grade.checked(by, any_value, "offset")
+        self._take(handle_edits.shift(self.grade, id, offset))
+
+    def move(self, stop: str, *, frame: float) -> None:
+        """Move a stop in time, within its edge."""
+        self._take(handle_edits.move(self.grade, stop, frame))
+
+    def adjust(
+        self,
+        id: str | None = None,
+        *,
+        track: bool = False,
+        frame: float | None = None,
+        **how: Unpack[How],
+    ) -> tuple[str, ...]:
+        """Move the colours of a handle, of a track or of the whole palette, as one step.
+
+        Give either `rgb`, or `by`, or some of `hue`, `chroma` and `lightness`.
+
+        Parameters
+        ----------
+        id : str, optional
+            A vertex, a stop, or an edge with its `frame`; None: the whole palette.
+        track : bool
+            Move every handle along the colour's way: back to all colours that it comes from, and on
+            to all that it becomes. A range implies it.
+        frame : float, optional
+            The frame at which an edge's colour is meant.
+        **how
+            The change, and when: the keywords of `palette4d.grade.handle_edits.How`.
+
+        Returns
+        -------
+        tuple of str
+            The vertices and stops that changed.
+        """
+        after, changed = handle_edits.adjust(self.grade, id, track=track, frame=frame, **how)
+        self._take(after)
+        return changed
+
+    def reset(self, id: str | None = None) -> None:
+        """Reset a vertex to its original colour, remove a stop, or (None) reset everything.
+
+        Everything: handles, picks, locks and the clip's ramp. Versions stay.
+        """
+        self._take(handle_edits.reset(self.grade, id))
+
+    def set_ramp(self, ramp: str, id: str | None = None) -> None:
+        """Set the ramp from a vertex or stop to the next handle in time, or the clip's ramp.
+
+        Parameters
+        ----------
+        ramp : {"linear", "smooth", "hold"}
+            Linear; the monotone cubic without overshoot; the handle's edit up to the next handle.
+        id : str, optional
+            The vertex or stop; None: all handles without a ramp of their own.
+        """
+        self._take(handle_edits.set_ramp(self.grade, ramp, id))
+
+    def lock(self, *ids: str) -> None:
+        """Keep vertices and stops where they are: moves of tracks and of the palette leave them."""
+        self._take(handle_edits.lock(self.grade, *ids))
+
+    def unlock(self, *ids: str) -> None:
+        """Let tracks and the palette move these vertices and stops again."""
+        self._take(handle_edits.unlock(self.grade, *ids))
+
+    # -------------------------------------------------------------------------------------- picks
+
+    def pick(
+        self,
+        frame: float,
+        *,
+        clip: PathLike | None = None,
+        progress: Progress | None = None,
+        **asked: Unpack[Asked],
+    ) -> Pick:
+        """Change a thing's colour into another one, and nothing else.
+
+        Which colours are the thing's is learned from the frame and from a few further frames of the
+        clip: what is connected with the picked place is the thing (docs/grading.md).
+
+        Parameters
+        ----------
+        frame : float
+            Where the colour is picked.
+        clip : path, optional
+            The clip; default: the sidecar's. Without a clip the pick takes all of its hue.
+        progress : callable, optional
+            Called as progress(done, total) while frames are read.
+        **asked
+            The place, the change, when, and what it takes: the keywords of
+            `palette4d.grade.pick_edits.Asked`.
+
+        Returns
+        -------
+        Pick
+            With its id and its path.
+
+        Raises
+        ------
+        Palette4dError
+            A value is out of range, or the clip does not fit.
+        """
+        after, made = pick_edits.pick(self.grade, self._clip(clip), frame, progress, **asked)
+        self._take(after)
+        return made
+
+    def hold(
+        self,
+        frame: float,
+        *,
+        clip: PathLike | None = None,
+        progress: Progress | None = None,
+        **asked: Unpack[When],
+    ) -> Pick:
+        """Keep a thing's colour as it is, whatever picks and handles do; as `pick`."""
+        after, made = pick_edits.hold(self.grade, self._clip(clip), frame, progress, **asked)
+        self._take(after)
+        return made
+
+    def correct_path(
+        self,
+        id: str,
+        frame: float,
+        *,
+        clip: PathLike | None = None,
+        progress: Progress | None = None,
+        **where: Unpack[Where],
+    ) -> Pick:
+        """Say where the colour of a pick or hold is at another frame; it is followed again.
+
+        Between two given frames the path goes gradually from what follows the one to what follows
+        the other.
+        """
+        of_clip = self._clip(clip)
+        self._take(pick_edits.correct_path(self.grade, of_clip, id, frame, progress, **where))
+        return self.grade.pick(id)
+
+    def add_area(self, id: str, area: Area, *, clip: PathLike | None = None) -> Pick:
+        """Say that a box or a stroke of a frame belongs to a pick or hold too; it learns again."""
+        self._take(pick_edits.add_area(self.grade, self._clip(clip), id, area))
+        return self.grade.pick(id)
+
+    def change_pick(self, id: str, *, clip: PathLike | None = None, **changes: Any) -> Pick:
+        """Change a pick or hold: any of the attributes of `Pick` but id, kind, path and matte.
+
+        `by` gives the new colour as offsets from the picked colour. A new `frame`, `rgb` or range
+        is followed again, if the pick was followed. `follow` begins or ends that. Where its place
+        or a hold changes, mattes are learned again. `any_value` and `progress` are those of `pick`.
+        """
+        self._take(pick_edits.change_pick(self.grade, self._clip(clip), id, **changes))
+        return self.grade.pick(id)
+
+    def unpick(self, *ids: str, clip: PathLike | None = None) -> None:
+        """Remove picks and holds. Without a hold, the others' mattes are learned again."""
+        self._take(pick_edits.unpick(self.grade, self._clip(clip), *ids))
+
+    def answer(
+        self, id: str, clip: PathLike | None = None, *, tries: bool = True
+    ) -> answer.Answer | None:
+        """Return what a pick takes of its frame, what else it takes, and what would help.
+
+        None where the clip is not there. Without `tries` nothing is proposed; it is quicker.
+        """
+        return answer.of(self.grade, self.grade.pick(id), self._clip(clip), tries=tries)
+
+    def pick_warnings(self, id: str, clip: PathLike | None = None) -> tuple[str, ...]:
+        """Return what speaks against the clip of a pick or hold, and its colour."""
+        return pick_edits.warnings(self.grade, self._clip(clip), id)
+
+    def _clip(self, clip: PathLike | None) -> ClipOfPicks:
+        return ClipOfPicks.of(self.grade, clip)
 
     # ----------------------------------------------------------------------------------- versions
 
-    @property
-    def versions(self) -> tuple[str, ...]:
-        """The names of the versions, sorted."""
-        return tuple(sorted(name for kind, name in self._state if kind == "version"))
+    def version(self, name: str) -> "Document":
+        """Return a document with the edits of a version as the active edits; "" returns this one.
+
+        It is not bound to the file: `save` needs a name.
+        """
+        return Document(self.grade.version(name), self.notes) if name else self
 
     def save_version(self, name: str) -> str | None:
         """Keep the active edits as a version. This is no step: `undo` leaves versions alone.
@@ -111,18 +411,8 @@ class Document(HandleEdits, PickEdits):
         str or None
             The name that an older version of this name has now, such as "former NAME".
         """
-        if not 1 <= len(name.strip()) <= LONGEST_NAME or not name.isprintable():
-            raise Palette4dError(
-                f"found the version name {name!r}, expected 1 to {LONGEST_NAME} printable "
-                "characters"
-            )
-        versions: dict[Key, Any] = {("version", name): self.fields()["edits"]}
-        former, active = self._state.get(("version", name)), self._active()
-        kept = None
-        if former is not None and edits.from_fields(former) != active:
-            kept = self._free_name(f"former {name}")
-            versions["version", kept] = former
-        self.apply(edits.difference(self._state, {**self._state, **versions}))
+        after, kept = versions.save_version(self.grade, name)
+        self._take(after)
         return kept
 
     def use_version(self, name: str) -> str | None:
@@ -135,31 +425,21 @@ class Document(HandleEdits, PickEdits):
         str or None
             The name of the new version, such as "before NAME".
         """
-        wanted = edits.from_fields(self._version(name))
-        versions, kept = self._versions_with_active(f"before {name}")
-        self.apply(edits.difference(self._state, {**wanted, **versions}, f"use version {name}"))
+        after, kept = versions.use_version(self.grade, name)
+        self._take(after)
         return kept
 
-    def _versions_with_active(self, name: str) -> tuple[dict[Key, Any], str | None]:
-        """Return the versions, with the active edits as another one if none holds them."""
-        versions = {key: value for key, value in self._state.items() if key[0] == "version"}
-        if not self._active() or self.same_edits():
-            return versions, None
-        kept = self._free_name(name)
-        versions["version", kept] = self.fields()["edits"]
-        return versions, kept
-
-    def _free_name(self, name: str) -> str:
-        names = (name[: LONGEST_NAME - 4] + more for more in _suffixes())
-        return next(each for each in names if ("version", each) not in self._state)
+    def remove_version(self, name: str) -> None:
+        """Remove a version; `undo` brings it back."""
+        self._take(versions.remove_version(self.grade, name))
 
     def copy_from(
         self,
         source: "Document",
         *,
-        time: Time = "relative",
-        clip: str | os.PathLike[str] | None = None,
-    ) -> Fit:
+        time: copying.Time = "relative",
+        clip: PathLike | None = None,
+    ) -> copying.Fit:
         """Take over the grade of another document, as one step.
 
         Each handle gets the colour that the other grade makes of its colour at the corresponding
@@ -187,76 +467,91 @@ class Document(HandleEdits, PickEdits):
             The source has no edits, the frame is outside of its clip, or its colour space cannot be
             converted.
         """
-        if source.path is not None and self.path is not None and _same(source.path, self.path):
-            raise Palette4dError(
-                f"{source._name} is the palette itself, which has this grade already; expected "
-                "another palette to copy from"
-            )
-        if not source.edited:
-            raise Palette4dError(
-                f"{source._name} has no edits; expected a graded palette to copy from"
-            )
-        state, picks = copied(self, source, time)
-        versions, _ = self._versions_with_active("before copy")
-        locks = {key: value for key, value in self._state.items() if key[0] == "lock"}
-        with self.one_step(f"copy the grade of {source._fields['clip']['name']}"):
-            self.apply(edits.difference(self._state, {**state, **locks, **versions}, ""))
-            left_out = self._take_picks(picks, clip)
-            return replace(fit(self, source, time), left_out=left_out)
+        after, fit = copying.copied(self.grade, source.grade, self._clip(clip), time)
+        self._take(after)
+        return fit
 
-    def same_edits(self) -> tuple[str, ...]:
-        """Return the names of the versions that hold the active edits."""
-        active = self._active()
-        return tuple(n for n in self.versions if edits.from_fields(self._version(n)) == active)
+    # ----------------------------------------------------------------------------------- pictures
 
-    def remove_version(self, name: str) -> None:
-        """Remove a version; `undo` brings it back."""
-        self._version(name)
-        self._put("version", name, None, f"remove version {name}")
+    def recolour(self, image: F32, frame: float, **how: Unpack[recolouring.Drawing]) -> F32:
+        """Recolour an image with the palette at a time: the same bits as the node.
 
-    def at(self, state: State) -> "Document":
-        """Return a document with another state of the user's edits, not bound to the file."""
-        found = copy.copy(self)
-        found._disk = None
-        if state != self._state:
-            found._become(state)
-        found.forget_history()
-        return found
+        Parameters
+        ----------
+        image : (h, w, 3 or 4) float32
+            Code values of the clip, 0..1 as a rule; a grade never changes alpha.
+        frame : float
+            The time; frames outside the clip use its first or last frame.
+        **how
+            The keywords of `palette4d.grade.recolouring.Drawing`.
 
-    def with_mattes_of(self, fields: Mapping[str, Any]) -> "Document":
-        """Return a document that also knows the mattes in a sidecar's members."""
-        found = copy.copy(self)
-        found._mattes = {**fields.get("mattes", {}).get("grids", {}), **self._mattes}
-        return found
-
-    def version(self, name: str) -> "Document":
-        """Return a document with the edits of a version as the active edits; "" returns this one.
-
-        It is not bound to the file: `save` needs a name.
+        Returns
+        -------
+        (h, w, 3 or 4) float32
+            A new array. Without edits it equals `image` bit by bit.
         """
-        if not name:
-            return self
-        fields = self._version(name)
-        others = {key: value for key, value in self._state.items() if key[0] == "version"}
-        return self.at({**edits.from_fields(fields), **others})
+        return recolouring.recolour(self.grade, image, frame, **how)
 
-    def _version(self, name: str) -> Fields:
-        found: Fields | None = self._state.get(("version", name))
-        if found is None:
-            there = ", ".join(map(repr, self.versions)) or "none"
-            raise Palette4dError(f"there is no version {name!r}; the palette has {there}")
-        return found
+    def matte(self, image: F32, frame: float, show: str, **how: Unpack[recolouring.Matting]) -> F32:
+        """Return a matte of an image: the same values as the node's.
+
+        Parameters
+        ----------
+        image : (h, w, 3 or 4) float32
+            As in `recolour`; colours are not multiplied by alpha, and alpha is ignored.
+        show : str
+            "weight:ID", a soft key of a vertex or stop, which follows its colour through time;
+            "pick:ID", the matte of a pick or hold; or "outside", the colours outside the palette.
+        frame, **how
+            As in `recolour`.
+
+        Returns
+        -------
+        (h, w) float32
+            0..1.
+        """
+        return recolouring.matte(self.grade, image, frame, show, **how)
+
+    def weights(
+        self, image: F32, frame: float, *, space: Literal["input", "palette"] = "input"
+    ) -> F32:
+        """Return the weight of each palette colour in each pixel (mean value coordinates).
+
+        Parameters
+        ----------
+        image : (h, w, 3 or 4) float32
+            As in `recolour`; colours are not multiplied by alpha, and alpha is ignored.
+        frame, space
+            As in `recolour`.
+
+        Returns
+        -------
+        (h, w, n) float32
+            Weights in the order of ``palette(frame).ids``; they sum to 1. They reproduce the pixel,
+            or, outside the palette, its nearest point. NaN for pixels that are not finite.
+        """
+        return recolouring.weights(self.grade, image, frame, space=space)
 
     # ------------------------------------------------------------------------------------- saving
 
     @property
+    def path(self) -> Path | None:
+        """The sidecar; None until it is saved."""
+        return self.grade.path
+
+    @property
     def changed(self) -> bool:
         """Whether there are unsaved changes."""
-        return self._disk is None or self._saved != (self._state, self._done, self._undone)
+        file = self._file
+        return file is None or (file.state, file.history) != (self.grade.state, self.history)
 
-    def save(
-        self, path: str | os.PathLike[str] | None = None, *, on_edits: OnEdits = "refuse"
-    ) -> None:
+    def fields(self) -> Fields:
+        """Return the members of the sidecar that `save` would write (docs/sidecar.md)."""
+        members = self.grade.fields(self.history.done, self.history.undone)
+        plain: Fields = _core.plain(members)
+        return plain
+
+    def save(self, path: PathLike | None = None, *, on_edits: OnEdits = "refuse") -> None:
         """Write the sidecar atomically: readers see the old file or the new file.
 
         Another program may have edited the file since it was loaded. Then `save` merges the edits
@@ -282,88 +577,40 @@ class Document(HandleEdits, PickEdits):
                 "this palette has no file yet; expected a name: save('clip.p4d.json')"
             )
         target = Path(path if path is not None else self.path or "")
-        if path is None and self._disk is None:
+        if path is None and self._file is None:
             raise Palette4dError(
                 f"this is not the document in {self.path}; expected another name to save it under"
             )
-        if self._disk is not None and self.path is not None and _same(target, self.path):
-            self._save_again(link_target(target), self._disk)
+        if self._file is not None and self.path is not None and same_file(target, self.path):
+            self._save_again(link_target(target), self._file)
             return
-        self._done = edits.bounded(self._done)
-        fields = self.fields()
+        fields = self.grade.fields(bounded(self.history.done), self.history.undone)
         if self.path is None:
-            fields["clip"]["source"] = _beside(fields["clip"]["source"], target)
-        from palette4d.grade import reanalysis  # which needs this module
-
-        path, self.path = self.path, target
-        try:
-            (core, fields, data), notes = reanalysis.save(fields, target, on_edits=on_edits)
-        except BaseException:
-            self.path = path
-            raise
+            clip = fields["clip"]
+            fields["clip"] = {**clip, "source": _beside(clip["source"], target)}
+        (core, fields, data), notes = reanalysis.save(fields, target, on_edits=on_edits)
+        self._saved(*_read(core, fields, target), data)
         self.notes += tuple(notes)
-        self._disk = data
-        self._start(core, fields)
 
-    def _save_again(self, target: Path, loaded: bytes) -> None:
+    def _save_again(self, target: Path, file: File) -> None:
         with locked(target) as held:
             found = sidecar.read_bytes(target)
-            if found == loaded and not self.changed:
+            if found == file.data and not self.changed:
                 return
-            new = self._merged(found) if found != loaded else copy.copy(self)
-            new._done = edits.bounded(new._done)
-            new._core, data = _core.encode_sidecar(new._members(), str(target))
+            grade, history = self.grade, self.history
+            if found != file.data:
+                theirs = _read(*sidecar.decoded(found, grade.name), self.path)
+                grade, history = merged(file, (grade, history), theirs)
+            history = replace(history, done=bounded(history.done))
+            members = grade.fields(history.done, history.undone)
+            core, data = _core.encode_sidecar(members, str(target))
             sidecar.write(target, data, held, replaces=found)
-        new._disk = data
-        new._mark_saved()
-        self.__dict__ = new.__dict__
-
-    def _merged(self, found: bytes) -> "Document":
-        """Return the document in the file with this document's changes since it was loaded."""
-        new = Document.__new__(Document)
-        new.path, new.notes = self.path, self.notes
-        new._start(*sidecar.decoded(found, self._name))
-        new._mattes = {**self._mattes, **new._mattes}
-        if new._fields["polytope"] != self._fields["polytope"]:
-            raise Palette4dError(
-                f"{self._name}: the clip was analysed again since this palette was loaded, and the "
-                "edits belong to the old palette; nothing was written. Load the file again, or "
-                "save under another name"
-            )
-        loaded, before, _ = self._saved
-        try:
-            state, names = edits.merged(loaded, self._state, new._state, self._taken())
-        except Palette4dError as error:
-            raise Palette4dError(f"{self._name}: {error.message.marked}") from None
-        both = zip(before, self._done, strict=False)
-        shared = sum(1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], both))
-        steps = [
-            replace(step.inverse(), label=f"undo: {step.label}")
-            for step in reversed(before[shared:])
-        ]
-        steps += self._done[shared:]
-        mine = edits.rebased([step.renamed(names) for step in steps], new._state)
-        theirs = new._state
-        for step in mine:
-            new._change(step)
-        last = edits.difference(new._state, state)
-        if last.undoable().changes:  # the steps on the way there met theirs
-            mine = [edits.difference(theirs, state, "edits of two programs").undoable()]
-        if last.changes:
-            new._become(state)
-        if mine:
-            new._done = new._done + mine
-            new._undone = [step.renamed(names) for step in self._undone]
-        return new
+        self._saved(replace(grade, analysed=core), history, data)
 
 
-def _suffixes() -> Iterator[str]:
-    yield ""
-    yield from (f" {number}" for number in itertools.count(2))
-
-
-def _same(a: Path, b: Path) -> bool:
-    return os.path.realpath(a) == os.path.realpath(b)
+def _read(core: _core.Sidecar, fields: Fields, path: Path | None) -> tuple[Grade, History]:
+    grade = Grade.of(core, fields, path)
+    return grade, History(*history_of(fields, grade.name))
 
 
 def _beside(source: str, output: Path) -> str:

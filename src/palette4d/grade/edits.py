@@ -5,16 +5,15 @@ A state maps keys to values. A key is a kind and an id:
 - ``("handle", id)``: a `Setting` of a palette vertex or of a colour stop. A vertex without one
   keeps its own colour; a stop without one does not exist.
 - ``("ramp", "")``: the clip's ramp between handles, one of `RAMPS`; absent: "linear".
-- ``("pick", id)``: a pick or a hold, as the sidecar's JSON object.
+- ``("pick", id)``: a `Pick`: a pick or a hold.
 - ``("lock", id)``: True for a handle that does not move.
-- ``("version", name)``: the sidecar's member "edits" of a named version.
+- ``("version", name)``: the state that the user keeps under a name, without versions.
 
 Input and output are plain values: this module knows neither files nor palettes.
 """
 
-import json
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
@@ -29,17 +28,14 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 Key = tuple[Kind, str]
 State = Mapping[Key, Any]
 
+#: The kinds that recolouring uses; versions wait.
+ACTIVE: tuple[Kind, ...] = ("handle", "ramp", "pick", "lock")
+
 #: The key of the clip's ramp.
 RAMP: Key = ("ramp", "")
 
 #: The largest absolute code value that the file format allows (docs/sidecar.md).
 LARGEST_COLOUR = 1e6
-
-#: Members of picks in files of version 1, in which they moved palette colours.
-FORMER = ("radius", "global_only", "spread", "residual", "worst", "worst_frame", "global")
-
-#: Limits of the history in a file: its steps, and their characters as JSON.
-MOST_STEPS, MOST_TEXT = 200, 256_000
 
 _HEX = re.compile(r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})")
 
@@ -126,7 +122,7 @@ class Change:
         id_ = names.get(self.key, self.id)
         values = [self.before, self.after]
         if self.kind == "pick":
-            values = [None if value is None else {**value, "id": id_} for value in values]
+            values = [None if value is None else replace(value, id=id_) for value in values]
         return Change(self.kind, id_, *values)
 
 
@@ -206,23 +202,6 @@ def folded(steps: Sequence[Edit]) -> Edit:
     count = sum(step.steps for step in steps)
     changes = tuple(change for change in found.values() if change.before != change.after)
     return Edit(changes, f"{count} earlier steps", count)
-
-
-def bounded(steps: list[Edit]) -> list[Edit]:
-    """Return the steps with the oldest folded into one, so that the file stays small.
-
-    At most `MOST_STEPS` steps remain, with at most `MOST_TEXT` characters beside the newest.
-    """
-    sizes = [len(json.dumps(step_to_fields(step))) for step in steps]
-    kept, total = 0, 0
-    while kept < min(len(steps), MOST_STEPS) and (not kept or total + sizes[-1 - kept] < MOST_TEXT):
-        total += sizes[-1 - kept]
-        kept += 1
-    if kept == len(steps):
-        return steps
-    kept = min(kept, MOST_STEPS - 1)
-    old = folded(steps[: len(steps) - kept])
-    return [old] * bool(old.changes) + steps[len(steps) - kept :]
 
 
 def rebased(steps: Iterable[Edit], state: State) -> list[Edit]:
@@ -327,147 +306,8 @@ def _is_number(text: str) -> bool:
     return text.isascii() and text.isdigit() and len(text) <= 9
 
 
-def _in_order(key: Key) -> tuple[int, int, str]:
+def in_order(key: Key) -> tuple[int, int, str]:
     """Sort s2 before s10, so that equal states give equal bytes."""
     id_ = key[1]
     number = int(id_[1:]) if _is_number(id_[1:]) else -1
     return KINDS.index(key[0]), number, id_
-
-
-# -------------------------------------------------------------------------------- as JSON values
-
-
-def from_fields(fields: Mapping[str, Any]) -> dict[Key, Any]:
-    """Return the state for a sidecar's member "edits"."""
-    state: dict[Key, Any] = {}
-    for entry in fields["vertices"]:
-        state["handle", entry["vertex"]] = _setting(entry)
-    for stop in fields["stops"]:
-        state["handle", stop["id"]] = _setting(stop)
-    if fields.get("ramp", "linear") != "linear":
-        state[RAMP] = as_ramp(fields["ramp"])
-    for pick in fields.get("picks", ()):
-        state["pick", pick["id"]] = {n: v for n, v in pick.items() if n not in FORMER}
-    for id_ in fields.get("locks", ()):
-        state["lock", id_] = True
-    return state
-
-
-def to_fields(state: State, vertex_ids: Iterable[str]) -> dict[str, Any]:
-    """Return a sidecar's member "edits".
-
-    Vertices have the palette's order; stops, picks and locks have the order of their ids.
-    """
-    handles = {
-        id_: state[kind, id_] for kind, id_ in sorted(state, key=_in_order) if kind == "handle"
-    }
-    fields: dict[str, Any] = {
-        "ramp": state.get(RAMP, "linear"),
-        "vertices": [
-            {"vertex": id_, **_of_setting(handles[id_])} for id_ in vertex_ids if id_ in handles
-        ],
-        "stops": [
-            {"id": id_, **_of_setting(setting)}
-            for id_, setting in handles.items()
-            if setting.edge is not None
-        ],
-        "picks": [dict(state[key]) for key in sorted(state, key=_in_order) if key[0] == "pick"],
-        "locks": [key[1] for key in sorted(state, key=_in_order) if key[0] == "lock"],
-    }
-    if fields["ramp"] == "linear":
-        del fields["ramp"]
-    return {n: v for n, v in fields.items() if v or n in ("vertices", "stops")}
-
-
-def _setting(entry: Mapping[str, Any]) -> Setting:
-    ramp, edge = entry.get("ramp"), entry.get("edge")
-    if edge is not None and not isinstance(edge, str):
-        raise ValueError(f"found the edge {edge!r}, expected an id")
-    return Setting(
-        as_colour(entry["rgb"]),
-        edge,
-        _number(entry, "frame"),
-        None if ramp is None else as_ramp(ramp),
-    )
-
-
-def _of_setting(setting: Setting) -> dict[str, Any]:
-    fields: dict[str, Any] = {}
-    if setting.edge is not None and setting.frame is not None:
-        whole = float(setting.frame).is_integer()
-        fields = {"edge": setting.edge, "frame": int(setting.frame) if whole else setting.frame}
-    fields["rgb"] = list(setting.rgb)
-    if setting.ramp is not None:
-        fields["ramp"] = setting.ramp
-    return fields
-
-
-def _number(entry: Mapping[str, Any], name: str) -> Any:
-    value = entry.get(name)
-    if value is not None and type(value) not in (int, float):
-        raise ValueError(f"found the {name} {value!r}, expected a number")
-    return value
-
-
-def _object(value: Any) -> dict[str, Any]:
-    return dict(value.items())
-
-
-def _pick(value: Any) -> dict[str, Any]:
-    from palette4d.grade.picks import Pick  # which needs this module
-
-    found = Pick.from_fields(value)
-    for name in ("frame", "from", "until", "fade", "reach", "softness"):
-        _number(value, name)
-    if found.kind not in ("pick", "hold") or found.frame is None:
-        raise ValueError(f"found the pick {found.id!r}, expected its kind and frame")
-    return {name: item for name, item in value.items() if name not in FORMER}
-
-
-def _true(value: Any) -> bool:
-    if value is not True:
-        raise ValueError(f"found {value!r}, expected true")
-    return True
-
-
-#: How each kind's values are read from JSON.
-_READ: dict[Kind, Callable[[Any], Any]] = {
-    "handle": _setting,
-    "ramp": as_ramp,
-    "pick": _pick,
-    "lock": _true,
-    "version": _object,
-}
-
-
-def step_to_fields(step: Edit) -> dict[str, Any]:
-    """Return a step of a sidecar's member "history"."""
-    fields: dict[str, Any] = {"step": step.label}
-    if step.steps != 1:
-        fields["steps"] = step.steps
-    changes = []
-    for change in step.changes:
-        values = (change.before, change.after)
-        listed = [_of_setting(v) if isinstance(v, Setting) else v for v in values]
-        changes.append([change.kind, change.id, *listed])
-    return {**fields, "changes": changes}
-
-
-def step_from_fields(fields: Any) -> Edit:
-    """Return the step of an entry of a sidecar's member "history".
-
-    Raises
-    ------
-    Palette4dError, TypeError, ValueError, LookupError, AttributeError
-        It is not a step.
-    """
-    changes = []
-    for kind, id_, *values in fields["changes"]:
-        before, after = (None if v is None else _READ[kind](v) for v in values)
-        if not isinstance(id_, str) or before == after:
-            raise ValueError(f"the change {kind!r} of {id_!r}")
-        changes.append(Change(kind, id_, before, after))
-    label, steps = fields["step"], fields.get("steps", 1)
-    if not isinstance(label, str) or type(steps) is not int or steps < 1 or not changes:
-        raise ValueError(f"the step {label!r}")
-    return Edit(tuple(changes), label, steps)

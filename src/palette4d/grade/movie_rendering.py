@@ -54,7 +54,7 @@ class MoviePlan:
     ) -> MoviePlan:
         """Plan a movie; OutputError if the codec does not fit."""
         # Image files rarely state a rate, so the sidecar's rate is used.
-        rate = clip.rate if clip.is_movie else Fraction(*document.core.clip["rate"])
+        rate = clip.rate if clip.is_movie else Fraction(*document.grade.core.clip["rate"])
         delivery = Delivery.plan(path, _stated(clip, rate), alpha=alpha, codec=codec, crf=crf)
         delivery.check_size(path, *size)
         copied, lost = None, []

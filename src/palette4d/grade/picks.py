@@ -299,11 +299,6 @@ class Pick:
         return float(np.interp(frame, frames, there)) if there.size else 1.0
 
 
-def all_picks(fields: Mapping[str, Any]) -> tuple[Pick, ...]:
-    """Return the picks and holds of a sidecar's member "edits"."""
-    return tuple(Pick.from_fields(entry) for entry in fields.get("picks", ()))
-
-
 def check(pick: Pick, frames: tuple[int, int, int]) -> None:
     """Refuse a pick whose range is empty or outside the clip, or whose values are out of range.
 

@@ -4,20 +4,23 @@ import itertools
 from pathlib import Path
 from typing import Any
 
-from palette4d import _core
 from palette4d.common.errors import SidecarError
 from palette4d.common.files import link_target, replacing
-from palette4d.grade import edits, sidecar
-from palette4d.grade.document import Document
-from palette4d.grade.sidecar import Fields, OnEdits
+from palette4d.grade import sidecar
+from palette4d.grade.clip_of_picks import ClipOfPicks
+from palette4d.grade.copying import copied
+from palette4d.grade.edits import Edit, difference
+from palette4d.grade.grade import Grade
+from palette4d.grade.handle_edits import reset
+from palette4d.grade.members import Fields, history_of
+from palette4d.grade.sidecar import OnEdits, Saved
+from palette4d.grade.versions import save_version
 
 #: `quality.options.method` of a palette that `analyze --like` moved.
 _MOVED = "like"
 
 
-def save(
-    fields: Fields, path: Path, *, on_edits: OnEdits = "refuse"
-) -> tuple[tuple[_core.Sidecar, Fields, bytes], list[str]]:
+def save(fields: Fields, path: Path, *, on_edits: OnEdits = "refuse") -> tuple[Saved, list[str]]:
     """Write the sidecar of a new analysis; return what `sidecar.save` does, and notes for the user.
 
     With `on_edits` "keep" and another palette than before, the edits stay with their handles if
@@ -36,51 +39,54 @@ def save(
     """
     target = link_target(path)
     old = sidecar.existing(target, on_edits) if on_edits == "keep" else None
-    keeps = old is not None and sidecar.has_edits(old) and not sidecar.has_edits(fields)
-    if old is None or not keeps or sidecar.same_palette(old, fields):
+    keeps = old is not None and sidecar.has_edits(old[1]) and not sidecar.has_edits(fields)
+    if old is None or not keeps or sidecar.same_palette(old[1], fields):
         return sidecar.save(fields, target, on_edits=on_edits), []
-    read = sidecar.read_bytes(target)
-    former, new = Document.load(target), Document(fields)
-    if (moved := _with_same_handles(former.fields(), new)) is not None:
-        return sidecar.save(moved, target, on_edits="drop", replaces=read), []
-    notes = []
-    with new.one_step("copy the grade of the former analysis"):
-        for name in former.versions:
-            if (version := former.version(name)).edited:
-                new.copy_from(version)
-                new.save_version(name)
-                new.reset()
-        if former.edited:
-            fit = new.copy_from(former)
-            notes.append(f"the palette changed, so that the grade was copied: {fit}")
+    read, before = old[2], old[1]
+    former = Grade.of(*old[:2], target)
+    new = Grade.of(sidecar.validate(fields, str(target)), fields, None)
+    extra = fields.get("extra") or before["extra"]
+    if (moved := _with_same_handles(former, new)) is not None:
+        done, undone = history_of(before, str(target))
+        found = {**moved.fields(done, undone), "extra": extra}
+        return sidecar.save(found, target, on_edits="drop", replaces=read), []
+    copy, notes = _copied(former, new)
     kept = _former(target, read)
     if not kept.exists():
         with replacing(kept, force=False) as temporary:
             temporary.write_bytes(read)
     notes.append(f"the former palette with its edits is kept in {kept.name}")
-    members: dict[str, Any] = {**new.fields(), "extra": fields.get("extra") or old["extra"]}
-    return sidecar.save(members, target, on_edits="drop", replaces=read), notes
+    step = difference(new.state, copy.state, "copy the grade of the former analysis").undoable()
+    steps: list[Edit] = [step] if step.changes else []
+    found = {**copy.fields(steps), "extra": extra}
+    return sidecar.save(found, target, on_edits="drop", replaces=read), notes
 
 
-def _with_same_handles(old: Fields, new: Document) -> Fields | None:
-    """Return the new document with the old edits, if its palette is the old one, moved, and they
-    fit.
+def _copied(former: Grade, new: Grade) -> tuple[Grade, list[str]]:
+    """Return the new grade with the look of the former one and of its versions, and notes."""
+    of_clip, notes = ClipOfPicks.of(new), []
+    for name in former.versions:
+        if (version := former.version(name)).edited:
+            new, _ = copied(new, version, of_clip)
+            new, _ = save_version(new, name)
+            new = reset(new)
+    if former.edited:
+        new, fit = copied(new, former, of_clip)
+        notes.append(f"the palette changed, so that the grade was copied: {fit}")
+    return new, notes
+
+
+def _with_same_handles(old: Grade, new: Grade) -> Grade | None:
+    """Return the new palette with the old edits, if it is the old one, moved, and they fit.
 
     Two palettes that were found may have the same ids for other colours.
     """
-    fields = new.fields()
-    method = fields.get("quality", {}).get("options", {}).get("method")
-    if method != _MOVED or _handles(old) != _handles(fields):
+    method = new.members.get("quality", {}).get("options", {}).get("method")
+    if method != _MOVED or _handles(old.members) != _handles(new.members):
         return None
+    found = new.with_mattes(old.mattes).with_state(old.state)
     try:
-        state = sidecar.state_of(old)
-        for (kind, name), version in state.items():
-            if kind == "version":
-                state[kind, name] = new.at(edits.from_fields(version)).fields()["edits"]
-        found = new.with_mattes_of(old).at(state).fields()
-        found |= {name: old[name] for name in ("history",) if name in old}
-        found["extra"] = fields.get("extra") or old["extra"]
-        sidecar.validate(found)
+        sidecar.validate(found.fields())
     except SidecarError:  # a handle has moved in time beyond an edit
         return None
     return found

@@ -95,7 +95,7 @@ def mismatches(document: Document, clip: Clip, whole: bool) -> list[str]:
 
     `whole`: the clip was opened with all its frames, not with a range.
     """
-    sidecar = document.core
+    sidecar = document.grade.core
     found = []
     size = f"{sidecar.clip['width']}x{sidecar.clip['height']}"
     if size != f"{clip.width}x{clip.height}":
@@ -180,7 +180,7 @@ class Painter:
         A filter of picks needs the whole picture, and so does one with its palette below.
         """
         whole = self.drawn.kind == "palette" or self.compare is not None
-        filtered = self.drawn.clean_up > 0 and bool(self.document.picks)
+        filtered = self.drawn.clean_up > 0 and bool(self.document.grade.picks)
         if not self.large or whole or filtered or isinstance(self.clip, ArrayClip):
             return self._drawn(source, frame)
         for rows in strips(*source.shape[:2]):
@@ -300,7 +300,7 @@ def render(
     drawn = Output(**picture)
     whole, output = frames is None, os.fspath(output)
     if not isinstance(clip, Clip):
-        clip = like_source(os.fspath(clip), str(document.core.clip["source"]))
+        clip = like_source(os.fspath(clip), str(document.grade.core.clip["source"]))
     movie = is_movie(Path(output))
     clip, fill = opened_for_render(clip, frames, missing, skip_bad_frames, movie=movie)
     width = clip.width * (2 if compare == "side" else 1)

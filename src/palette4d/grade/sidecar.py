@@ -1,27 +1,25 @@
-"""The sidecar's text and files: the reader and the only writer.
+"""The sidecar's files: the reader and the only writer.
 
-Input and output are a sidecar's members as plain dicts and lists; `docs/sidecar.md` explains them.
-The core (`palette4d._core`) validates every text before it is written.
+Input and output are a sidecar's members as plain dicts and lists (`members`). The core reads and
+writes their text.
 """
 
 import os
 import stat
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from palette4d import _core
 from palette4d.common.errors import Arg, Palette4dError, SidecarError
 from palette4d.common.files import link_target, refuse_existing, replacing
 from palette4d.common.locking import locked
 from palette4d.common.text import counted
-from palette4d.grade import edits
+from palette4d.grade.members import Fields, edits_fields, edits_from
 from palette4d.media.clip_sequence import IMAGE_EXTENSIONS, MOVIE_EXTENSIONS
 
-if TYPE_CHECKING:
-    from palette4d.grade.mattes import Display
-
-Fields = dict[str, Any]
+#: The core's view of a file, its members and its bytes.
+Saved = tuple[_core.Sidecar, Fields, bytes]
 OnEdits = Literal["refuse", "keep", "drop"]
 
 SCHEMA = "palette4d.sidecar"
@@ -134,23 +132,21 @@ def load(path: str | os.PathLike[str]) -> Fields:
 
 def decoded(data: bytes, name: str) -> tuple[_core.Sidecar, Fields]:
     """Return the core's view of a text, and its members; 24.0 becomes 24 where it is whole."""
-    core, document = _core.decode_sidecar(data, name)
-    if document["version"] < _core.SIDECAR_VERSION:
-        _upgrade(document)
-    clip = document["clip"]
+    core, members = _core.decode_sidecar(data, name)
+    return core, up_to_date(members)
+
+
+def up_to_date(members: Fields) -> Fields:
+    """Bring members up to date in place: picks of version 1 moved palette colours."""
+    vertices = [vertex["id"] for vertex in members["polytope"]["vertices"]]
+    for part in (members, *members.get("versions", ())):
+        if members["version"] == 1 and {"picks", "solution"} & part["edits"].keys():
+            part["edits"] = edits_fields(edits_from(part["edits"]), vertices)
+    clip = members["clip"]
     frames = clip["frames"]
     for holder, names in ((frames, ("first", "last", "step", "skipped")), (clip, ("rate", "size"))):
         holder.update({name: _whole(holder[name]) for name in names})
-    return core, document
-
-
-def _upgrade(document: Fields) -> None:
-    """Bring the members of version 1 up to date: picks no longer move palette colours."""
-    for part in (document["edits"], *(v["edits"] for v in document.get("versions", ()))):
-        part.pop("solution", None)
-        for pick in part.get("picks", ()):
-            for name in edits.FORMER:
-                pick.pop(name, None)
+    return members
 
 
 def _whole(value: Any) -> Any:
@@ -160,103 +156,6 @@ def _whole(value: Any) -> Any:
 def has_edits(document: Mapping[str, Any]) -> bool:
     """Return whether a document holds edits or versions."""
     return bool(any(document["edits"].values()) or document.get("versions"))
-
-
-def state_of(document: Mapping[str, Any]) -> dict[edits.Key, Any]:
-    """Return what the user set: the state of `edits` and `versions`."""
-    state = edits.from_fields(document["edits"])
-    for version in document.get("versions", ()):
-        state["version", version["name"]] = version["edits"]
-    return state
-
-
-def with_state(document: Fields, state: edits.State, vertex_ids: Iterable[str]) -> Fields:
-    """Return a document with the `edits` and `versions` of a state."""
-    found = {**document, "edits": edits.to_fields(state, vertex_ids)}
-    names = sorted(name for kind, name in state if kind == "version")
-    found["versions"] = [{"name": name, "edits": state["version", name]} for name in names]
-    return found if names else {n: v for n, v in found.items() if n != "versions"}
-
-
-def with_mattes(
-    document: Fields, texts: Mapping[str, str], curve: Callable[[], "Display | None"]
-) -> Fields:
-    """Return a document with the mattes of its picks, those of versions and steps too.
-
-    Without picks the file has the first version of the format, so that older programs read it.
-    """
-    picks = list(_picks_in(document))
-    document = {name: value for name, value in document.items() if name != "mattes"}
-    document["version"] = 2 if picks else 1
-    mattes = mattes_of(picks, texts, curve)
-    if len(mattes) > 1 or mattes["grids"]:
-        document["mattes"] = mattes
-    return document
-
-
-def mattes_of(
-    picks: Sequence[Fields], texts: Mapping[str, str], curve: Callable[[], "Display | None"]
-) -> Fields:
-    """Return the member "mattes" for picks."""
-    mattes: Fields = {}
-    if picks and (display := curve()) is not None:
-        start, end, values = display
-        mattes["display"] = {"from": start, "to": end, "values": values}
-    used = sorted({pick["matte"] for pick in picks if "matte" in pick} & texts.keys())
-    return {**mattes, "grids": {id_: texts[id_] for id_ in used}}
-
-
-def _picks_in(document: Fields) -> Iterator[Fields]:
-    """Yield all picks of a document: of its edits, its versions and its steps."""
-    for part in (document["edits"], *(v["edits"] for v in document.get("versions", ()))):
-        yield from part.get("picks", ())
-    history = document.get("history", {})
-    for step in (*history.get("done", ()), *history.get("undone", ())):
-        for kind, _, *values in step["changes"]:
-            for value in filter(None, values):
-                if kind == "pick":
-                    yield value
-                elif kind == "version":
-                    yield from value.get("picks", ())
-
-
-def history_of(document: Mapping[str, Any], name: str) -> tuple[list[edits.Edit], list[edits.Edit]]:
-    """Return the done and the undone steps of a document.
-
-    Raises
-    ------
-    SidecarError
-        The member "history" is unusable.
-    """
-    history = document.get("history", {})
-    found = []
-    for part in ("done", "undone"):
-        try:
-            steps = [edits.step_from_fields(step) for step in history.get(part, [])]
-        except (Palette4dError, TypeError, ValueError, LookupError, AttributeError) as error:
-            raise SidecarError(
-                name,
-                f"/history/{part}",
-                f"an unusable list of steps ({error})",
-                "the steps that palette4d wrote; remove the member `history` to go on without them",
-            ) from None
-        # Older files have steps that make versions.
-        found.append([kept for step in steps if (kept := step.undoable()).changes])
-    return found[0], found[1]
-
-
-def with_history(
-    document: Fields, done: Sequence[edits.Edit], undone: Sequence[edits.Edit]
-) -> Fields:
-    """Return a document with these steps; without steps it has no member "history"."""
-    parts = {"done": done, "undone": undone}
-    history = {n: v for n, v in document.get("history", {}).items() if n not in parts}
-    history |= {
-        n: [edits.step_to_fields(step) for step in part] for n, part in parts.items() if part
-    }
-    if history:
-        return {**document, "history": history}
-    return {name: value for name, value in document.items() if name != "history"}
 
 
 def check_target(path: str | os.PathLike[str], *, on_edits: OnEdits = "refuse") -> None:
@@ -271,8 +170,8 @@ def check_target(path: str | os.PathLike[str], *, on_edits: OnEdits = "refuse") 
     target = link_target(path)
     refuse_existing(target, force=True)
     old = existing(target, on_edits)
-    if old is not None and has_edits(old) and on_edits == "refuse":
-        raise _would_lose(target, old)
+    if old is not None and has_edits(old[1]) and on_edits == "refuse":
+        raise _would_lose(target, old[1])
 
 
 def save(
@@ -281,7 +180,7 @@ def save(
     *,
     on_edits: OnEdits = "refuse",
     replaces: bytes | None = None,
-) -> tuple[_core.Sidecar, Fields, bytes]:
+) -> Saved:
     """Write a sidecar; return the core's view of it, its members and its text.
 
     The core validates the text before it replaces the file. After any failure, also Ctrl-C, the old
@@ -311,11 +210,11 @@ def save(
     target = link_target(path)
     with locked(target) as held:
         old = existing(target, on_edits)
-        if old is not None and has_edits(old) and old["edits"] != members.get("edits"):
+        if old is not None and has_edits(old[1]) and old[1]["edits"] != members.get("edits"):
             if on_edits == "refuse":
-                raise _would_lose(target, old)
+                raise _would_lose(target, old[1])
             if on_edits == "keep":
-                members = _with_edits_of(old, members, target)
+                members = _with_edits_of(old[1], members, target)
         core, data = _core.encode_sidecar(members, os.fspath(target))
         write(target, data, held, replaces=replaces)
     return core, members, data
@@ -362,8 +261,8 @@ def same_palette(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
     return bool(_core.plain(one["polytope"]) == _core.plain(other["polytope"]))
 
 
-def existing(target: Path, on_edits: OnEdits) -> Fields | None:
-    """Return the document that a save would replace; None if no edits would be lost."""
+def existing(target: Path, on_edits: OnEdits) -> Saved | None:
+    """Return what a save would replace; None if no edits would be lost."""
     if on_edits not in ("refuse", "keep", "drop"):
         raise ValueError(f"on_edits: found {on_edits!r}, expected 'refuse', 'keep' or 'drop'")
     try:
@@ -374,7 +273,8 @@ def existing(target: Path, on_edits: OnEdits) -> Fields | None:
     if on_edits == "drop":
         return None
     try:
-        return load(target)
+        data = read_bytes(target)
+        return (*decoded(data, os.fspath(target)), data)
     except Palette4dError as error:
         raise Palette4dError(
             f"{target} exists and cannot be read as a sidecar ({error}); it may hold edits. "

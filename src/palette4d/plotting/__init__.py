@@ -84,10 +84,10 @@ def plot(
     if not isinstance(document, Document):
         document = Document.load(document)
     graded = document.version(version)
-    sidecar = graded.core
+    sidecar = graded.grade.core
     stored = ClipColours(sidecar.polytope, graded.fields())
-    shares = track_shares(stored, graded.tracks)
-    against = None if before is None else document.version(before).core.edits
+    shares = track_shares(stored, graded.grade.tracks)
+    against = None if before is None else document.version(before).grade.core.edits
     names = ("before", "after") if before is None else (before or "active", version or "active")
     first, last = sidecar.polytope.first_frame, sidecar.polytope.last_frame
     if frames is None:
@@ -108,7 +108,7 @@ def plot(
         matplotlib.rc_context(style.RC),
         replacing(output, force=force) as temporary,
     ):
-        figure = page.build(sidecar, columns, against, names, graded.colour_names, shares)
+        figure = page.build(sidecar, columns, against, names, graded.grade.colour_names, shares)
         page.save(figure, temporary, output.suffix.lower()[1:], width)
     return [column.frame for column in columns if not column.pictures]
 

@@ -130,7 +130,7 @@ def _on_farm(
             f"OUT.####.exr, .png or .tif with {Arg('cluster')}, or leave {Arg('cluster')} out"
         )
     rendering.refuse_codec(str(output), codec, crf)
-    spec = like_source(spec, str(document.core.clip["source"]))
+    spec = like_source(spec, str(document.grade.core.clip["source"]))
     clip, fill = rendering.opened_for_render(spec, frames, missing, skip_bad_frames, movie=False)
     pattern = FramePattern.parse(str(output))
     samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)

@@ -172,11 +172,11 @@ class Display:
     def wanted(document: Document | None, encoding: str) -> tuple[str, str | None]:
         """Return the space and the config for a document's clip, or a clip with this encoding."""
         if document is not None:
-            conversion = document.core.conversion
+            conversion = document.grade.core.conversion
             if conversion is not None:
                 return conversion.input_space, conversion.config or None
-            if document.encoding != "unknown":
-                return document.encoding, None
+            if document.grade.encoding != "unknown":
+                return document.grade.encoding, None
         return encoding, None
 
     @property

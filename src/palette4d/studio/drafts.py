@@ -35,7 +35,7 @@ class Drafts(SessionView):
     @property
     def picked(self) -> Pick | None:
         """The pick or hold that is selected, the first one."""
-        picks = () if self.document is None else self.document.picks
+        picks = () if self.document is None else self.document.grade.picks
         return next((pick for pick in picks if pick.id in self.selection), None)
 
     @property
@@ -55,7 +55,7 @@ class Drafts(SessionView):
         document, clip = self.document, self.clip
         if document is None or clip is None:
             return
-        trial, source, self._waits = document.trial(), clip.source, place
+        trial, source, self._waits = Document(document.grade), clip.source, place
 
         def work() -> None:
             try:
@@ -110,7 +110,7 @@ class Drafts(SessionView):
         if id == DRAFT and self._drafted is not None:
             _, document, made = self._drafted
             id_ = made.id
-        picks = () if document is None else document.picks
+        picks = () if document is None else document.grade.picks
         if document is None or all(pick.id != id_ for pick in picks):
             return None
-        return document.core.pick_matte_at(str(id_), self.frame)
+        return document.grade.core.pick_matte_at(str(id_), self.frame)

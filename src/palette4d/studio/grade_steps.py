@@ -18,7 +18,7 @@ from palette4d.studio.states import Place
 
 def handles_of(document: Document, ids: tuple[str, ...]) -> list[str]:
     """Return those ids that are vertices or stops."""
-    known = {*document.core.polytope.vertex_ids, *document.settings}
+    known = {*document.grade.core.polytope.vertex_ids, *document.grade.settings}
     return [id_ for id_ in ids if id_ in known]
 
 
@@ -27,8 +27,8 @@ def reset(session: Session) -> None:
     document, clip = session.document, source_of(session)
     if document is None:
         return
-    picks = [pick for pick in document.picks if pick.id in session.selection]
-    ids = [id_ for id_ in session.selection if id_ in document.settings]
+    picks = [pick for pick in document.grade.picks if pick.id in session.selection]
+    ids = [id_ for id_ in session.selection if id_ in document.grade.settings]
     said = texts.REMOVED if picks and not ids else texts.WAS_RESET
 
     def change(document: Document) -> None:
@@ -52,8 +52,8 @@ def remove(session: Session, ids: list[str]) -> None:
     document, clip = session.document, source_of(session)
     if document is None:
         return
-    locks = [id_ for id_ in ids if id_ in document.locks]
-    picks = [pick for pick in document.picks if pick.id in ids]
+    locks = [id_ for id_ in ids if id_ in document.grade.locks]
+    picks = [pick for pick in document.grade.picks if pick.id in ids]
     names = [pick.id for pick in picks]
 
     def change(document: Document) -> None:
@@ -73,10 +73,10 @@ def lock(session: Session) -> None:
     ids = [] if document is None else handles_of(document, session.selection)
     if document is None or not ids:
         session.say(texts.SELECT_A_HANDLE, "warning")
-    elif set(ids) <= set(document.locks):
+    elif set(ids) <= set(document.grade.locks):
         session.edit(lambda d: d.unlock(*ids), texts.WAS_UNLOCKED.format(ids=", ".join(ids)))
     else:
-        new = [id_ for id_ in ids if id_ not in document.locks]
+        new = [id_ for id_ in ids if id_ not in document.grade.locks]
         session.edit(lambda d: d.lock(*new), texts.WAS_LOCKED.format(ids=", ".join(new)))
 
 
@@ -107,7 +107,7 @@ def enable(session: Session, id_: str, on: bool) -> None:
     def change(document: Document) -> None:
         document.change_pick(id_, enabled=on, clip=clip)
 
-    picks = [] if document is None else [pick for pick in document.picks if pick.id == id_]
+    picks = [] if document is None else [pick for pick in document.grade.picks if pick.id == id_]
     said, verb = (texts.ENABLED, "enable") if on else (texts.DISABLED, "disable")
     _as_one(session, verb, [id_], change, said, alone=False, learns=_holds(picks))
 
@@ -187,9 +187,9 @@ def keep_version(session: Session) -> None:
     document = session.document
     if document is None:
         return
-    rounds = ("", *map(str, range(2, len(document.versions) + 3)))
+    rounds = ("", *map(str, range(2, len(document.grade.versions) + 3)))
     names = (letter + again for again in rounds for letter in map(chr, range(65, 91)))
-    name = next(each for each in names if each not in document.versions)
+    name = next(each for each in names if each not in document.grade.versions)
     text = texts.KEPT_VERSION.format(name=name)
     session.edit(lambda document: document.save_version(name), text)
 

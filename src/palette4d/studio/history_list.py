@@ -31,9 +31,9 @@ class History(QWidget):
         rows = [texts.BEGINNING] if document is not None else []
         done = 0
         if document is not None:
-            rows += [edit.label for edit in document.history]
-            done = len(document.history)
-            rows += [edit.label for edit in reversed(document.undone)]
+            rows += [edit.label for edit in document.history.done]
+            done = len(document.history.done)
+            rows += [edit.label for edit in reversed(document.history.undone)]
         self.list.clear()
         for k, text in enumerate(rows):
             item = QListWidgetItem(text)
@@ -50,7 +50,7 @@ class History(QWidget):
         document = self.session.document
         if document is None:
             return
-        for _ in range(len(document.history) - row):
+        for _ in range(len(document.history.done) - row):
             self.session.undo()
-        for _ in range(row - len(document.history)):
+        for _ in range(row - len(document.history.done)):
             self.session.redo()

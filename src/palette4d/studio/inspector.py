@@ -243,7 +243,7 @@ class Inspector(QWidget):
     def lch(self) -> Lch:
         """The conversion of the document's palette."""
         document = self.session.document
-        encoding = "unknown" if document is None else document.encoding
+        encoding = "unknown" if document is None else document.grade.encoding
         if self._lch is None or self._lch[0] != encoding:
             self._lch = encoding, Lch(encoding)
         return self._lch[1]
@@ -279,7 +279,8 @@ class Inspector(QWidget):
             part.setEnabled(target is not None)
         self.scope_row.setVisible(target is None or not target.picked)
         self.reset.setEnabled(
-            document is not None and any(id_ in document.settings for id_ in self.session.selection)
+            document is not None
+            and any(id_ in document.grade.settings for id_ in self.session.selection)
         )
         if target is None:
             self.title.setText(texts.NOTHING_SELECTED)
@@ -296,7 +297,7 @@ class Inspector(QWidget):
         more = texts.AND_MORE.format(count=count - 1) if count > 1 else ""
         name, called = target.id, ""
         if document is not None:
-            called = document.colour_names.get(target.id) or document.called(target.id)
+            called = document.grade.colour_names.get(target.id) or document.grade.called(target.id)
         if target.place is not None:
             name = texts.PLACE.format(x=target.place.x, y=target.place.y)
         self.title.setText(f"{name}{more}")
@@ -364,25 +365,25 @@ class Inspector(QWidget):
     def _show_ramp(self) -> None:
         document, target = self.session.document, self.target
         own = None
-        if document is not None and target is not None and target.id in document.settings:
-            own = document.settings[target.id].ramp
-        can = target is None or (document is not None and target.id in document.settings)
+        if document is not None and target is not None and target.id in document.grade.settings:
+            own = document.grade.settings[target.id].ramp
+        can = target is None or (document is not None and target.id in document.grade.settings)
         self.ramp.setEnabled(document is not None and can)
         shown = own
         if target is None and document is not None:
-            shown = document.ramp
+            shown = document.grade.ramp
         self.ramp.setCurrentIndex(max(0, self.ramp.findData(shown)))
 
     def in_clip(self, rgb: F64) -> F64:
         """Return code values of the clip for code values of the palette."""
         document = self.session.document
-        own = None if document is None else document.core.conversion
+        own = None if document is None else document.grade.core.conversion
         return rgb if own is None else np.asarray(own.steps.to_clip(rgb))
 
     def in_palette(self, rgb: F64) -> F64:
         """Return code values of the palette for code values of the clip."""
         document = self.session.document
-        own = None if document is None else document.core.conversion
+        own = None if document is None else document.grade.core.conversion
         return rgb if own is None else np.asarray(own.steps.to_palette(rgb))
 
     # --------------------------------------------------------------------------------- what it does
@@ -557,7 +558,7 @@ class Inspector(QWidget):
     def _ramp_chosen(self, index: int) -> None:
         document = self.session.document
         if document is not None:
-            grade_steps.set_ramp(self.session, self.ramp.itemData(index) or document.ramp)
+            grade_steps.set_ramp(self.session, self.ramp.itemData(index) or document.grade.ramp)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Escape takes a drag back."""

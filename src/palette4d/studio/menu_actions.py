@@ -129,7 +129,7 @@ class MenuActions:
     def compare_version(self) -> None:
         """Compare with the next version that differs; after the last with the source."""
         document = self.session.document
-        same = () if document is None else document.same_edits()
+        same = () if document is None else document.grade.same_edits
         names = ["", *(name for name in self.session.versions if name not in same)]
         now = self.session.view.version
         at = names.index(now) if now in names else 0
@@ -162,9 +162,9 @@ class MenuActions:
         document = self.session.document
         if document is None:
             return []
-        times = {float(t) for t in document.core.polytope.vertices[:, 3]}
-        times |= {s.frame for s in document.settings.values() if s.frame is not None}
-        first, last, _ = document.frames
+        times = {float(t) for t in document.grade.core.polytope.vertices[:, 3]}
+        times |= {s.frame for s in document.grade.settings.values() if s.frame is not None}
+        first, last, _ = document.grade.frames
         return sorted({round(min(max(time, first), last)) for time in times})
 
     def loop(self) -> None:

@@ -72,8 +72,8 @@ class PickList(QWidget):
     def refresh(self) -> None:
         """Show the document's picks, holds and locks."""
         document = self.session.document
-        picks = () if document is None else document.picks
-        locks = () if document is None else document.locks
+        picks = () if document is None else document.grade.picks
+        locks = () if document is None else document.grade.locks
         self._silent = True
         self.list.clear()
         for pick in picks:
@@ -189,8 +189,8 @@ class Versions(QWidget):
         self.keep.setEnabled(document is not None)
         if self.session.dragging:
             return
-        names = () if document is None else document.versions
-        used = () if document is None else document.same_edits()
+        names = () if document is None else document.grade.versions
+        used = () if document is None else document.grade.same_edits
         if (names, used) == self._shown:
             return
         self._shown = (names, used)

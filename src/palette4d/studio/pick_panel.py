@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 from palette4d.common.errors import in_words
 from palette4d.common.text import percent
 from palette4d.grade.answer import Answer
+from palette4d.grade.document import Document
 from palette4d.grade.picks import MOST_REACH, Area, Pick
 from palette4d.plotting import style
 from palette4d.studio import grade_steps, paint, texts, theme
@@ -259,8 +260,10 @@ class PickPanel(QWidget):
         if session.dragging or session.following:
             return  # the session tells of the document again when that is done
         # What it takes depends on itself and on holds; its new colour changes nothing.
-        own = [replace(p, to=None) for p in document.picks if p.kind == "hold" or p.id == pick.id]
-        asked, trial = (document, source, own), document.trial()
+        own = [
+            replace(p, to=None) for p in document.grade.picks if p.kind == "hold" or p.id == pick.id
+        ]
+        asked, trial = (document, source, own), Document(document.grade)
         known = session.answer if asked == self._known else None
         self._waits = asked
         if known is None:

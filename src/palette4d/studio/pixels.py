@@ -36,7 +36,7 @@ def place_between(session: Session, first: tuple[int, int], last: tuple[int, int
     assert session.clip is not None
     straight = _core.straight_colours(box, premultiplied=session.clip.premultiplied)
     colours = straight.reshape(-1, 3).astype(np.float64)
-    own = session.document.core.conversion
+    own = session.document.grade.core.conversion
     if own is not None:
         colours = own.steps.to_palette(colours)
     colours = colours[np.isfinite(colours).all(axis=1)]

@@ -53,14 +53,14 @@ class Grade:
     @classmethod
     def of(cls, document: Document, frame: float) -> "Grade":
         """Return a document's grade at a time."""
-        palette, own = document.palette(frame), document.core.conversion
-        picks = document.core.edits.picks_at(palette.frame)
+        palette, own = document.grade.palette(frame), document.grade.core.conversion
+        picks = document.grade.core.edits.picks_at(palette.frame)
         return cls(palette, None if own is None else own.steps, picks)
 
     @classmethod
     def of_version(cls, document: Document, name: str, frame: float) -> "Grade | None":
         """Return the grade of a version at a time; None if there is no such version."""
-        return cls.of(document.version(name), frame) if name in document.versions else None
+        return cls.of(document.version(name), frame) if name in document.grade.versions else None
 
     def recolourer(self) -> _core.Recolourer:
         """Return the exact recolouring."""

@@ -23,7 +23,7 @@ U8 = NDArray[np.uint8]
 def on_screen(session: "Session", rgb: ArrayLike) -> U8:
     """Return (…, 3) uint8 display values of (…, 3) code values of the palette; NaN is black."""
     colours = np.nan_to_num(np.asarray(rgb, np.float64))
-    conversion = None if session.document is None else session.document.core.conversion
+    conversion = None if session.document is None else session.document.grade.core.conversion
     if conversion is not None:
         colours = conversion.steps.to_clip(colours)
     return _painted(session.display, session.looked, colours.astype(np.float32))

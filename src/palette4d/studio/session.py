@@ -78,7 +78,7 @@ class Session(Drafts):
     @property
     def versions(self) -> tuple[str, ...]:
         """The names of the document's versions."""
-        return () if self._document is None else self._document.versions
+        return () if self._document is None else self._document.grade.versions
 
     @property
     def path(self) -> Path | None:
@@ -95,17 +95,17 @@ class Session(Drafts):
             document before cannot be saved.
         """
         document = Document.load(path)
-        found = find_clip(Path(path), document.core.clip, clip)
+        found = find_clip(Path(path), document.grade.core.clip, clip)
         self._leave()
         self._document = document
         self._stamp = _stamp(Path(path))
-        first, last, step = document.frames
+        first, last, step = document.grade.frames
         self.frame = first + (last - first) // (2 * step) * step
         self._set_clip(found)
         self._changed()
         self.emit("frame")
         if found is None:
-            source = document.core.clip["source"] or document.core.clip["name"]
+            source = document.grade.core.clip["source"] or document.grade.core.clip["name"]
             self.say(texts.CLIP_MISSING.format(source=source), "warning")
         else:
             self.say(self._fit() or texts.OPENED.format(name=Path(path).name))
@@ -140,11 +140,11 @@ class Session(Drafts):
         if document is None or clip is None:
             return ""
         found = []
-        width, height = document.core.clip["width"], document.core.clip["height"]
+        width, height = document.grade.core.clip["width"], document.grade.core.clip["height"]
         if (width, height) != (clip.width, clip.height):
             own, other = f"{width}x{height}", f"{clip.width}x{clip.height}"
             found.append(texts.OTHER_SIZE.format(own=own, found=other))
-        first, last, step = document.frames
+        first, last, step = document.grade.frames
         wanted = range(first, last + 1, step)
         held = {frame for frame in clip.frames if frame in wanted}
         if lacks := len(wanted) - len(held):
@@ -156,7 +156,7 @@ class Session(Drafts):
     def frames(self) -> tuple[int, int, int]:
         """First and last frame and the step: the document's, else the clip's."""
         if self._document is not None:
-            return self._document.frames
+            return self._document.grade.frames
         if self.clip is not None:
             return self.clip.frames[0], self.clip.frames[-1], max(self.clip.step, 1)
         return 0, 0, 1
@@ -210,7 +210,7 @@ class Session(Drafts):
         if document is None:
             return None
         dragged, self._trial, self._dragged = self.dragging, None, None
-        before = len(document.history)
+        before = document.history.done
         try:
             result = operation(document)
         except (Palette4dError, OSError) as error:
@@ -219,9 +219,10 @@ class Session(Drafts):
             self.report(error)
             return None
         self._note_edit()
-        changes = document.history[-1].changes if document.history else ()
-        forced = [c.id for c in changes if c.kind == "handle" and c.id in document.locks]
-        if forced and len(document.history) > before:
+        done = document.history.done
+        changes = done[-1].changes if done else ()
+        forced = [c.id for c in changes if c.kind == "handle" and c.id in document.grade.locks]
+        if forced and len(done) > len(before):
             locked = texts.LOCKED_MOVED.format(ids=", ".join(forced))
             self.say(f"{text}; {locked}" if text else locked, "warning")
         elif text:
@@ -243,7 +244,7 @@ class Session(Drafts):
         document, dragged = self._document, self._dragged
         if document is None:
             return
-        trial = document.trial()
+        trial = Document(document.grade)
 
         def say(done: int, total: int) -> None:
             words = texts.FOLLOWING.format(done=done, total=total)
@@ -263,7 +264,7 @@ class Session(Drafts):
             self.emit("followed")
 
         def repeat(own: Document) -> None:
-            for step in trial.history:
+            for step in trial.history.done:
                 own.apply(step)
 
         def fail(error: Exception) -> None:
@@ -290,13 +291,14 @@ class Session(Drafts):
     def take_mattes(self, trial: Document) -> None:
         """Have the mattes that were learned for a copy of the document."""
         if self._document is not None:
-            self._document._mattes.update(trial._mattes)
+            own = self._document
+            own.grade = own.grade.with_mattes(trial.grade.mattes)
 
     def drag(self, operation: Edit, text: str = "") -> None:
         """Show an edit without doing it; each call replaces the last."""
         if self._document is None:
             return
-        trial = self._document.trial()
+        trial = Document(self._document.grade)
         try:
             operation(trial)
         except (Palette4dError, OSError) as error:
@@ -367,7 +369,7 @@ class Session(Drafts):
         document = self._document
         if document is None or document.path is None:
             return document is None
-        before = document.state
+        before = document.grade.state
         try:
             document.save()
         except (Palette4dError, OSError) as error:
@@ -381,7 +383,7 @@ class Session(Drafts):
                 self._copy.unlink(missing_ok=True)
             self._copy = None
             self.say(texts.SAVED_NOW)
-        if document.state != before:
+        if document.grade.state != before:
             self.say(texts.MERGED)
             self._changed()
         self.emit("status")
@@ -480,7 +482,7 @@ def _stamp(path: Path) -> tuple[int, int, int] | None:
 def _applies(trial: Document, document: Document) -> bool:
     """Return whether what the steps of a copy change is in the document as they found it."""
     found: dict[Key, object] = {}
-    for change in (change for step in trial.history for change in step.changes):
+    for change in (change for step in trial.history.done for change in step.changes):
         found.setdefault(change.key, change.before)
-    state = document.state
+    state = document.grade.state
     return all(state.get(key) == before for key, before in found.items())

@@ -145,10 +145,10 @@ class Shots(QWidget):
 def thumbnail(sidecar: Path) -> U8 | None:
     """Return a shot's middle frame, graded, (h, w, 4) uint8; None without its clip."""
     document = Document.load(sidecar)
-    clip = find_clip(sidecar, document.core.clip, None)
+    clip = find_clip(sidecar, document.grade.core.clip, None)
     if clip is None:
         return None
-    first, last, _ = document.frames
+    first, last, _ = document.grade.frames
     frame = nearest_frame(clip, (first + last) / 2)
     pixels = clip.read(frame)
     scale = min(THUMB.width() / clip.width, THUMB.height() / clip.height, 1.0)

@@ -115,7 +115,7 @@ class SolidView(QWidget):
     def palette_now(self) -> Palette | None:
         """Return the palette at the playhead."""
         document = self.session.document
-        return None if document is None else document.palette(float(self.session.frame))
+        return None if document is None else document.grade.palette(float(self.session.frame))
 
     def view_of(self, palette: Palette) -> View:
         """Return the projection; while a colour is dragged it stays as it was."""
@@ -166,7 +166,7 @@ class SolidView(QWidget):
             straight = _core.straight_colours(image, premultiplied=premultiplied)
             colours = even_sample(straight, PIXELS).astype(np.float64)
             document = session.document
-            own = None if document is None else document.core.conversion
+            own = None if document is None else document.grade.core.conversion
             if own is not None:
                 colours = np.asarray(own.steps.to_palette(colours))
             self._pixels = key, colours, on_screen(session, colours)
@@ -189,7 +189,7 @@ class SolidView(QWidget):
     def handle_of(self, palette: Palette, index: int) -> str:
         """Return the vertex or stop that a colour lies on, or its edge."""
         document, id_ = self.session.document, palette.ids[index]
-        for name, setting in {} if document is None else document.settings.items():
+        for name, setting in {} if document is None else document.grade.settings.items():
             if setting.edge == id_ and setting.frame == palette.frame:
                 return name
         return id_
@@ -357,7 +357,7 @@ class Moving:
 
     def __call__(self, document: Document) -> str:
         """Do it; return the handle that has the colour."""
-        if self.id in document.core.polytope.vertex_ids:
+        if self.id in document.grade.core.polytope.vertex_ids:
             document.set(self.id, rgb=self.new)
             return self.id
         near = document.set_near(self.old, frame=self.frame, rgb=self.new, anyway=True)

@@ -53,16 +53,16 @@ class Target:
 
 def target_of(document: Document, id_: str, frame: float) -> Target | None:
     """Return a selected handle or palette colour; None if it is not there at the playhead."""
-    polytope = document.core.polytope
+    polytope = document.grade.core.polytope
     if id_ in polytope.vertex_ids:
         at = float(np.asarray(polytope.vertices)[polytope.vertex_ids.index(id_), 3])
         return _in_palette(document, id_, "vertex", id_, at)
-    for pick in document.picks:
+    for pick in document.grade.picks:
         if pick.id == id_:
             before = np.asarray(pick.rgb)
             after = before if pick.to is None else np.asarray(pick.to)
             return Target(id_, pick.kind, pick.frame, before, after)
-    setting = document.settings.get(id_)
+    setting = document.grade.settings.get(id_)
     if setting is not None and setting.edge is not None and setting.frame is not None:
         return _in_palette(document, id_, "stop", setting.edge, setting.frame)
     if id_ in polytope.edge_ids:
@@ -84,7 +84,7 @@ def _in_palette(
     place: str,
     frame: float,
 ) -> Target | None:
-    palette = document.palette(frame)
+    palette = document.grade.palette(frame)
     if place not in palette.ids:
         return None
     index = palette.ids.index(place)
@@ -158,9 +158,9 @@ class PickTo:
         if target.kind == "pick":
             document.change_pick(target.id, to=self.rgb, any_value=True)
         elif target.kind == "place" and draft is not None:
-            id_ = new_id("p", (pick.id for pick in document.picks))
-            fields = replace(draft, id=id_, to=as_colour(self.rgb)).to_fields()
-            document.apply(Edit((Change("pick", id_, None, fields),), ""))
+            id_ = new_id("p", (pick.id for pick in document.grade.picks))
+            made = replace(draft, id=id_, to=as_colour(self.rgb))
+            document.apply(Edit((Change("pick", id_, None, made),), ""))
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,7 @@ def menu_for(
             texts.REMOVE_STOP if hit.stop else texts.RESET, lambda: grade_steps.reset(session)
         )
         _add_ramps(menu, session)
-        locked = session.document is not None and hit.id in session.document.locks
+        locked = session.document is not None and hit.id in session.document.grade.locks
         menu.addAction(texts.UNLOCK if locked else texts.LOCK, lambda: grade_steps.lock(session))
         menu.addSeparator()
     elif hit.what == "pick":
@@ -113,5 +113,5 @@ def _add_ramps(menu: QMenu, session: Session) -> None:
         entry = ramps.addAction(texts.RAMPS[ramp])
         entry.triggered.connect(lambda _=False, ramp=ramp: grade_steps.set_ramp(session, ramp))
         entry.setCheckable(True)
-        own = [document.settings[id_].ramp for id_ in ids if id_ in document.settings]
+        own = [document.grade.settings[id_].ramp for id_ in ids if id_ in document.grade.settings]
         entry.setChecked(bool(own) and all(each == ramp for each in own))

@@ -238,7 +238,7 @@ class TimelinePainter:
                 each.kind,
                 selected=each.id in selected,
             )
-        locks = set() if self.session.document is None else set(self.session.document.locks)
+        locks = set() if self.session.document is None else set(self.session.document.grade.locks)
         for each in shown:
             if each.id in locks:
                 paint.padlock(painter, each.x + each.radius, each.y + each.radius)
@@ -262,7 +262,7 @@ class TimelinePainter:
 
     def _colour_names(self) -> dict[str, str]:
         document = self.session.document
-        return {} if document is None else document.colour_names
+        return {} if document is None else document.grade.colour_names
 
     def _paint_ruler(self, painter: QPainter) -> None:
         painter.save()

@@ -114,7 +114,7 @@ class Places:
         if document is None:
             return None
         if self._palette is None or self._palette[0] != key:
-            palette = PlottedPalette.of(document.core)
+            palette = PlottedPalette.of(document.grade.core)
             old = self._palette
             if old is not None and old[1].edges == palette.edges and old[1].ids == palette.ids:
                 rows = old[2]  # the rows depend on the clip's palette alone, not on edits
@@ -184,7 +184,7 @@ class Places:
         if self._lanes is None or self._lanes[0] != self.session.revision:
             ends: list[float] = []
             placed = []
-            for pick in sorted(document.picks, key=lambda pick: self.reach(pick)[0]):
+            for pick in sorted(document.grade.picks, key=lambda pick: self.reach(pick)[0]):
                 start, *_, end = self.reach(pick)
                 free = [lane for lane, last in enumerate(ends) if last < start]
                 lane = free[0] if free else min(len(ends), MOST_LANES - 1)

@@ -383,7 +383,7 @@ class TimelineView(QWidget):
 
     def _called(self, id_: str) -> str:
         document = self.session.document
-        return "" if document is None else document.called(id_)
+        return "" if document is None else document.grade.called(id_)
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         """Show the menu of what is under the pointer."""

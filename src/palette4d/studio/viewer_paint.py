@@ -145,7 +145,7 @@ class ViewerPainter:
             box = self._mark(painter, place.x, place.y, place.box, hold=False, cross=True)
             inspected = np.array([place.colour, place.colour])
             _flag(painter, box, texts.NEW_PICK, on_screen(session, inspected), bright=True)
-        for pick in () if session.document is None else session.document.picks:
+        for pick in () if session.document is None else session.document.grade.picks:
             if pick.pixel is None or pick.frame != session.frame:
                 continue
             x, y = pick.pixel
@@ -325,7 +325,7 @@ class ViewerPainter:
     def _pick_colour(self, id_: str) -> QColor:
         """Return the new colour of a pick, or that of the clicked pixel, as displayed."""
         document, place = self.session.document, self.session.place
-        picks = () if document is None else document.picks
+        picks = () if document is None else document.grade.picks
         rgb = next((pick.to or pick.rgb for pick in picks if pick.id == id_), None)
         if rgb is None:
             rgb = (1.0, 1.0, 1.0) if place is None else place.colour
@@ -335,7 +335,7 @@ class ViewerPainter:
         """Return the frame's palette colours as displayed, by id."""
         if self.session.document is None:
             return {}
-        palette = self.session.document.palette(self.session.frame)
+        palette = self.session.document.grade.palette(self.session.frame)
         shown = on_screen(self.session, palette.edited)
         return {id_: QColor(*rgb) for id_, rgb in zip(palette.ids, shown.tolist(), strict=True)}
 

@@ -381,8 +381,8 @@ class Window(QMainWindow):
         facts = []
         if session.path is not None and document is not None:
             facts = [session.path.name, texts.SAVED if session.saved else texts.UNSAVED]
-            facts.append(texts.HANDLES.format(count=len(document.core.polytope.vertex_ids)))
-            picks = sum(kind == "pick" for kind, _ in document.state)
+            facts.append(texts.HANDLES.format(count=len(document.grade.core.polytope.vertex_ids)))
+            picks = sum(kind == "pick" for kind, _ in document.grade.state)
             if picks:
                 facts.append(texts.PICKS.format(count=picks))
         elif session.clip is not None:
@@ -425,7 +425,9 @@ class Window(QMainWindow):
         ):
             self.actions_by_name[action].setEnabled(open_)
         self.actions_by_name["undo"].setEnabled(open_ and bool(document and document.history))
-        self.actions_by_name["redo"].setEnabled(open_ and bool(document and document.undone))
+        self.actions_by_name["redo"].setEnabled(
+            open_ and bool(document and document.history.undone)
+        )
         for action in ("reset_selected", "lock", "add_stop", "act_from", "act_until"):
             self.actions_by_name[action].setEnabled(open_ and bool(session.selection))
         many = self.shots.count() > 1

@@ -1,0 +1,94 @@
+"""The steps of a document: taken back, applied again, and merged with those of another program."""
+
+import itertools
+from dataclasses import dataclass, replace
+
+from palette4d.common.errors import Palette4dError
+from palette4d.grade import edits
+from palette4d.grade.edits import Edit, State
+from palette4d.grade.grade import Grade
+
+
+@dataclass(frozen=True)
+class History:
+    """The steps of a document, also those of earlier sessions.
+
+    Attributes
+    ----------
+    done : tuple of Edit
+        The steps that `undo` reverts, oldest first.
+    undone : tuple of Edit
+        The steps that `redo` applies again, the next one last.
+    """
+
+    done: tuple[Edit, ...] = ()
+    undone: tuple[Edit, ...] = ()
+
+    def with_step(self, step: Edit) -> "History":
+        """Return the history after another step; without changes it is no step."""
+        return History((*self.done, step)) if step.changes else self
+
+    def back(self, grade: Grade) -> tuple[Grade, "History", Edit]:
+        """Return the grade before the last step, the steps then, and the step."""
+        if not self.done:
+            raise Palette4dError("there is nothing to undo: the palette has no earlier step")
+        step = self.done[-1]
+        return grade.after(step.inverse()), History(self.done[:-1], (*self.undone, step)), step
+
+    def forth(self, grade: Grade) -> tuple[Grade, "History", Edit]:
+        """Return the grade after the last undone step, the steps then, and the step."""
+        if not self.undone:
+            raise Palette4dError("there is nothing to redo: no step was undone since the last edit")
+        step = self.undone[-1]
+        return grade.after(step), History((*self.done, step), self.undone[:-1]), step
+
+
+@dataclass(frozen=True)
+class File:
+    """What a document's file holds: its bytes, and the state and steps that they say."""
+
+    data: bytes
+    state: State
+    history: History
+
+
+def merged(
+    file: File, mine: tuple[Grade, History], theirs: tuple[Grade, History]
+) -> tuple[Grade, History]:
+    """Return the grade and the steps of another program with mine since the file was read.
+
+    Raises
+    ------
+    Palette4dError
+        The palettes differ, or both changed one value in different ways.
+    """
+    (own, history), (other, found) = mine, theirs
+    if other.members["polytope"] != own.members["polytope"]:
+        raise Palette4dError(
+            f"{own.name}: the clip was analysed again since this palette was loaded, and the "
+            "edits belong to the old palette; nothing was written. Load the file again, or "
+            "save under another name"
+        )
+    taken = {*own.handles.vertices, *own.handles.edges}
+    try:
+        state, names = edits.merged(file.state, own.state, other.state, taken)
+    except Palette4dError as error:
+        raise Palette4dError(f"{own.name}: {error.message.marked}") from None
+    before = file.history.done
+    both = zip(before, history.done, strict=False)
+    shared = sum(1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], both))
+    steps = [
+        replace(step.inverse(), label=f"undo: {step.label}") for step in reversed(before[shared:])
+    ]
+    steps += history.done[shared:]
+    new = edits.rebased([step.renamed(names) for step in steps], other.state)
+    reached = other.state
+    for step in new:
+        reached = step.apply(reached)
+    last = edits.difference(reached, state)
+    if last.undoable().changes:  # the steps on the way there met theirs
+        new = [edits.difference(other.state, state, "edits of two programs").undoable()]
+    if new:
+        undone = tuple(step.renamed(names) for step in history.undone)
+        found = History((*found.done, *new), undone)
+    return other.with_mattes(own.mattes).with_state(state), found
