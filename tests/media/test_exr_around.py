@@ -16,7 +16,7 @@ from deliveries import render, tiles
 from palette4d.common.errors import WriteError
 from palette4d.grade import rendering
 from palette4d.grade.document import Document
-from palette4d.media import exr_around
+from palette4d.media import exr_around, exr_copy
 from palette4d.media.clip import open_clip
 
 OpenEXR = pytest.importorskip("OpenEXR")
@@ -215,7 +215,7 @@ def test_a_full_disk_is_said_and_nothing_half_written_stays(tmp_path):
         for short in (1000, size // 2):
             resource.setrlimit(resource.RLIMIT_FSIZE, (short, limit[1]))
             with pytest.raises(WriteError):
-                exr_around.write_around(out / "o.exr", around, pixels, "float")
+                exr_copy.write_around(out / "o.exr", around, pixels, "float")
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limit)
         signal.signal(signal.SIGXFSZ, handler)

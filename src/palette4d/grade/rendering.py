@@ -22,7 +22,7 @@ from palette4d.media.clip import Clip, Image, open_clip
 from palette4d.media.clip_base import F32, ClipError, FrameError, describe, named, strips
 from palette4d.media.clip_images import ImageClip
 from palette4d.media.codecs import is_movie
-from palette4d.media.exr_around import write_around
+from palette4d.media.exr_copy import write_around
 from palette4d.media.frame_tags import frame_notes, of_colours, of_movie
 from palette4d.media.frame_writer import (
     FramePattern,

@@ -1,7 +1,6 @@
 """EXR files that hold more than the picture: overscan, further channels and parts, attributes.
 
-OpenImageIO reads the picture. OpenEXR's own library copies the file around it, because it keeps
-every type of channel and attribute.
+`exr_copy` copies such a file around another picture.
 """
 
 from __future__ import annotations
@@ -12,15 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-
-from palette4d.common.errors import WriteError
-from palette4d.common.files import replacing
 
 # Rows of the picture in a block of a file, by the number of the compression.
 _ROWS = {0: 1, 1: 1, 2: 1, 3: 16, 4: 32, 5: 16, 6: 32, 7: 32, 8: 32, 9: 256, 10: 256, 11: 32}
-#: Compressions that lose nothing: none, RLE, ZIPS, ZIP, PIZ.
-_LOSSLESS = (0, 1, 2, 3, 4)
 
 
 @dataclass(frozen=True)
@@ -53,59 +46,6 @@ def described(spec: Any, chosen: list[int], parts: int) -> str:
     if parts > 1:
         found.append(f"{parts - 1} further part{'s' * (parts > 2)}")
     return ", ".join(found)
-
-
-def write_around(path: Path, around: Around, pixels: NDArray[np.float32], samples: str) -> None:
-    """Write a copy of an EXR whose picture is replaced, under a temporary name, and rename it.
-
-    Parameters
-    ----------
-    path : of the copy.
-    around : the file and the place of the picture in it.
-    pixels : (h, w, 3 or 4) float32, premultiplied; of the picture's whole data window.
-    samples : "half" or "float", for the picture's channels; others keep their types.
-
-    Raises
-    ------
-    WriteError
-        The folder is not writable or the disk is full; no partial file remains.
-    """
-    import OpenEXR
-
-    from palette4d.media.frame_writer import cannot_write, quantised
-
-    try:
-        file = OpenEXR.File(str(around.file), separate_channels=True)
-    except (RuntimeError, OSError) as error:
-        raise WriteError(
-            f"{path}: {around.file} cannot be copied around the picture ({error}); expected an EXR "
-            "that OpenEXR reads. Render to another format, or mend the file"
-        ) from error
-    channels = file.parts[around.part].channels
-    planes = quantised(pixels, samples)
-    for index, name in enumerate(around.channels):
-        channels[name].pixels = np.ascontiguousarray(planes[..., index])
-    for part in file.parts:
-        _lossless_rows(part.header)
-    with replacing(path, force=True) as temporary:
-        try:
-            file.write(str(temporary))
-        except (RuntimeError, OSError) as error:
-            raise cannot_write(path, str(error)) from error
-        if not has_every_block(temporary):
-            raise cannot_write(path, "")
-
-
-def _lossless_rows(header: dict[str, Any]) -> None:
-    """Let a part be written in rows, by a compression without loss."""
-    import OpenEXR
-
-    header.pop("tiles", None)
-    header.pop("chunkCount", None)
-    if header.get("type") == OpenEXR.tiledimage:
-        header["type"] = OpenEXR.scanlineimage
-    if int(header["compression"]) not in _LOSSLESS:
-        header["compression"] = OpenEXR.ZIP_COMPRESSION
 
 
 def has_every_block(path: Path) -> bool:
