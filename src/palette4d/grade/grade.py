@@ -79,7 +79,8 @@ class Grade:
     def of(cls, analysed: _core.Sidecar, fields: Fields, path: Path | None) -> Self:
         """Return the grade of a sidecar's members."""
         mattes = fields.get("mattes", {}).get("grids", {})
-        handles, state = Handles(fields["polytope"]), members.state_of(fields)
+        state = MappingProxyType(members.state_of(fields))
+        handles = Handles(fields["polytope"])
         return cls(fields, analysed, handles, path, state, mattes)
 
     # -------------------------------------------------------------------------------- other grades

@@ -7,6 +7,7 @@ learned from frames of the clip (`grade.mattes`); the core computes the rest for
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -32,6 +33,11 @@ ALIKE = 0.08
 
 #: The largest absolute `Pick.reach`: beyond, a matte takes all or nothing.
 MOST_REACH = 8.0
+
+
+#: Attributes with other names in a sidecar, and those that are frames or pixels.
+_NAMES = {"start": "from"}
+_WHOLE = {"frame", "start", "until", "fade", "pixel", "points", "radius"}
 
 
 @dataclass(frozen=True)
@@ -134,79 +140,29 @@ class Pick:
     @classmethod
     def from_fields(cls, fields: Mapping[str, Any]) -> Pick:
         """Return the pick of an entry of a sidecar's ``edits.picks``."""
-        to, pixel = fields.get("to"), fields.get("pixel")
-        lowest, highest = fields.get("lightness", (0.0, 1.0))
+        known = {
+            field.name: _NAMES.get(field.name, field.name) for field in dataclasses.fields(cls)
+        }
+        found = {own: fields[name] for own, name in known.items() if name in fields}
+        for name in ("rgb", "to"):
+            if name in found:
+                found[name] = as_colour(found[name])
+        for name in ("pixel", "lightness"):
+            if name in found:
+                found[name] = (found[name][0], found[name][1])
+        path, areas = found.pop("path", ()), found.pop("areas", ())
         return cls(
-            id=fields["id"],
-            kind=fields["kind"],
-            frame=fields["frame"],
-            rgb=as_colour(fields["rgb"]),
-            to=None if to is None else as_colour(to),
-            toward=fields.get("toward", "shift"),
-            start=fields.get("from"),
-            until=fields.get("until"),
-            fade=fields.get("fade", 0.0),
-            enabled=fields.get("enabled", True),
-            path=tuple(
-                PathKey(
-                    key["frame"],
-                    as_colour(key["rgb"]),
-                    key.get("given", False),
-                    key.get("there", 1.0),
-                )
-                for key in fields.get("path", ())
-            ),
-            pixel=None if pixel is None else (pixel[0], pixel[1]),
-            box=fields.get("box"),
+            **found,
+            path=tuple(PathKey(**{**key, "rgb": as_colour(key["rgb"])}) for key in path),
             areas=tuple(
-                Area(area["frame"], tuple((x, y) for x, y in area["points"]), area["radius"])
-                for area in fields.get("areas", ())
+                Area(**{**area, "points": tuple((x, y) for x, y in area["points"])})
+                for area in areas
             ),
-            matte=fields.get("matte"),
-            whole_hue=fields.get("whole_hue", False),
-            reach=fields.get("reach", 0.0),
-            softness=fields.get("softness", 0.5),
-            lightness=(lowest, highest),
         )
 
     def to_fields(self) -> dict[str, Any]:
         """Return the pick as an entry of a sidecar's ``edits.picks``; defaults are left out."""
-        path = [
-            {"frame": _number(key.frame), "rgb": list(key.rgb)}
-            | ({"given": True} if key.given else {})
-            | ({"there": key.there} if key.there < 1 else {})
-            for key in self.path
-        ]
-        areas = [
-            {
-                "frame": _number(area.frame),
-                "points": [[_number(value) for value in point] for point in area.points],
-                "radius": _number(area.radius),
-            }
-            for area in self.areas
-        ]
-        every: dict[str, Any] = {
-            "id": self.id,
-            "kind": self.kind,
-            "frame": _number(self.frame),
-            "rgb": list(self.rgb),
-            "to": None if self.to is None else list(self.to),
-            "toward": None if self.toward == "shift" else self.toward,
-            "from": None if self.start is None else _number(self.start),
-            "until": None if self.until is None else _number(self.until),
-            "fade": _number(self.fade) or None,
-            "enabled": None if self.enabled else False,
-            "path": path or None,
-            "pixel": None if self.pixel is None else [_number(value) for value in self.pixel],
-            "box": self.box,
-            "areas": areas or None,
-            "matte": self.matte,
-            "whole_hue": self.whole_hue or None,
-            "reach": self.reach or None,
-            "softness": None if self.softness == 0.5 else self.softness,
-            "lightness": None if self.lightness == (0.0, 1.0) else list(self.lightness),
-        }
-        return {name: value for name, value in every.items() if value is not None}
+        return _fields_of(self)
 
     def colour_at(self, frame: float) -> F64:
         """Return where the colour is at a frame, (3,)."""
@@ -338,6 +294,20 @@ def check(pick: Pick, frames: tuple[int, int, int]) -> None:
         raise Palette4dError(f"found toward {pick.toward!r}, expected 'shift' or 'colour'")
 
 
-def _number(value: float) -> float:
-    """Return whole numbers as int, so that the file has 40 and not 40.0."""
-    return int(value) if float(value).is_integer() else float(value)
+def _fields_of(thing: Pick | PathKey | Area) -> dict[str, Any]:
+    found = {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing)}
+    left_out = {f.name for f in dataclasses.fields(thing) if found[f.name] == f.default}
+    return {
+        _NAMES.get(name, name): _plain(value, name in _WHOLE)
+        for name, value in found.items()
+        if name not in left_out
+    }
+
+
+def _plain(value: Any, whole: bool) -> Any:
+    """Return a JSON value; whole numbers become int, so that the file has 40 and not 40.0."""
+    if isinstance(value, tuple):
+        return [_plain(each, whole) for each in value]
+    if isinstance(value, PathKey | Area):
+        return _fields_of(value)
+    return int(value) if whole and float(value).is_integer() else value
