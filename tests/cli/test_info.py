@@ -15,6 +15,7 @@ from palette4d import _core
 from palette4d.cli import main
 from palette4d.cli.info import info_of
 from palette4d.grade.document import Document
+from palette4d.grade.grade import Grade
 from palette4d.grade.palette import Palette
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
@@ -39,11 +40,11 @@ def test_a_palette_is_computed_once_for_all_tracks(monkeypatch: pytest.MonkeyPat
     frames: list[float] = []
     palette_at = document.grade.palette
 
-    def palette(frame: float) -> Palette:
+    def palette(_: Grade, frame: float) -> Palette:
         frames.append(frame)
         return palette_at(frame)
 
-    monkeypatch.setattr(document, "palette", palette)
+    monkeypatch.setattr(Grade, "palette", palette)
     assert len(info_of(document)["tracks"]) > 2
     assert len(frames) == len({*frames})
 

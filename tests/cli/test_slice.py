@@ -8,7 +8,7 @@ import pytest
 
 from palette4d.cli.main import main
 from palette4d.grade import sidecar
-from palette4d.grade.document import Document
+from palette4d.grade.grade import Grade
 
 EDITED = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_edited.p4d.json"
 
@@ -51,7 +51,7 @@ def test_a_clip_without_end_is_refused_before_anything_is_made(
 ) -> None:
     endless = with_last_frame(tmp_path / "endless.p4d.json", 1_000_000_000)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(Document, "palette", None)  # the first slice would fail
+    monkeypatch.setattr(Grade, "palette", None)  # the first slice would fail
     assert main([endless if word == "SIDECAR" else word for word in command]) == 1
     assert "more than 1000000 frames" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
