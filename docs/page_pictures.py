@@ -269,8 +269,8 @@ def calls() -> None:
         left = 0.2 + 3.9 * k
         axes.imshow(strip, extent=(left, left + 3.8, lower + 0.42, lower + 0.1), zorder=2,
                     interpolation="nearest", aspect="auto")  # fmt: skip
-    write(axes, 2.1, lower + 0.6, "doc.palette(30).rgb", family="monospace", fontsize=10)
-    write(axes, 6.0, lower + 0.6, "doc.palette(30).edited", family="monospace", fontsize=10)
+    write(axes, 2.1, lower + 0.6, "doc.grade.palette(30).rgb", family="monospace", fontsize=10)
+    write(axes, 6.0, lower + 0.6, "doc.grade.palette(30).edited", family="monospace", fontsize=10)
     save(figure, "calls")
 
 

@@ -111,7 +111,7 @@ def test_a_locked_colour_that_is_changed_by_hand_is_said(opened: Window) -> None
 def test_the_playhead_goes_from_handle_to_handle(opened: Window) -> None:
     document, session = opened.session.document, opened.session
     assert document is not None
-    frames = sorted({round(float(t)) for t in document.core.polytope.vertices[:, 3]})
+    frames = sorted({round(float(t)) for t in document.grade.core.polytope.vertices[:, 3]})
     for way, wanted in (("next_handle", frames), ("previous_handle", frames[::-1])):
         session.go(wanted[0])
         seen = [session.frame]
@@ -183,7 +183,7 @@ def test_a_sidecar_that_cannot_be_written_is_kept_elsewhere(
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (there, ""))
     opened.close()
     assert not opened.isVisible()
-    assert palette4d.load(there).colour(id_) == (0.0, 1.0, 0.0)
+    assert palette4d.load(there).grade.colour(id_) == (0.0, 1.0, 0.0)
 
 
 @pytest.mark.slow
