@@ -15,11 +15,10 @@ ROOMS: dict[str, set[str]] = {
     "core/convert": {"model"},
     "core/sidecar": {"model", "convert"},
     "core/recolour": {"simd", "threads", "model", "convert"},
-    "core/lattice": {"simd", "model", "convert", "recolour"},
     "core/output": {"simd", "threads", "model", "convert", "recolour"},
     "core/fit": {"simd", "threads", "model"},
     "gpu": {"gpu/kernel", "simd", "model", "recolour", "output"},
-    "node": {"model", "convert", "sidecar", "recolour", "lattice", "output", "gpu"},
+    "node": {"model", "convert", "sidecar", "recolour", "output", "gpu"},
 }
 INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"', re.MULTILINE)
 

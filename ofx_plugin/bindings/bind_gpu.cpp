@@ -40,7 +40,7 @@ py::tuple table(const std::shared_ptr<const Recolourer>& map, const std::string&
     Drawing drawing;
     drawing.options = {found->second,  matte_in_alpha, outside_at, strength,
                        keep_lightness, lightness,      mix,        0};
-    (drawing.options.is_matte() ? drawing.reader : drawing.exact) = map;
+    (drawing.options.is_matte() ? drawing.reader : drawing.edit) = map;
     const std::string problem = gpu::lacks(drawing);
     if (!problem.empty()) throw py::value_error("the kernel cannot draw " + problem);
     const gpu::FrameTable made = gpu::frame_table(drawing, premultiplied);

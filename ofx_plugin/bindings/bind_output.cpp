@@ -45,7 +45,7 @@ py::array draw(const py::array& image, const std::string& output,
     if (drawing.options.is_matte()) {
         drawing.reader = map;
     } else if (map->moves()) {
-        drawing.edit = drawing.exact = map;
+        drawing.edit = map;
     }
     if (drawing.options.output == Output::kPalette) {
         drawing.original = colours_from(original, "original");

@@ -7,7 +7,6 @@
 
 #include "arrays.hpp"
 #include "binders.hpp"
-#include "lattice/lattice.hpp"
 #include "recolour/recolour.hpp"
 
 using namespace palette4d;
@@ -45,9 +44,7 @@ InstructionSet instructions_from(const std::string& name) {
     throw py::value_error("instructions: found '" + name + "', expected one of " + names);
 }
 
-/// Recolours with a Recolourer or a Lattice.
-template <class Map>
-py::array apply(const Map& self, const py::array& image, double strength, bool premultiplied,
+py::array apply(const Recolourer& self, const py::array& image, double strength, bool premultiplied,
                 int threads, const py::object& out, const std::string& precision,
                 const std::string& instructions, const ColourConversion* conversion) {
     require_image(image, "image");
@@ -133,37 +130,11 @@ void bind_recolour(py::module_& module) {
             },
             py::arg("colours"), py::kw_only(), py::arg("strength") = 1.0,
             "(n, 3) float64 in and out, in double; colours that are not finite stay.")
-        .def("apply", &apply<Recolourer>, py::arg("image"), py::kw_only(),
-             py::arg("strength") = 1.0, py::arg("premultiplied") = false, py::arg("threads") = 1,
-             py::arg("out") = py::none(), py::arg("precision") = "double",
-             py::arg("instructions") = "best", py::arg("conversion") = py::none(),
-             "(h, w, 3 or 4) float32 in and out; threads 0 means one per processor.");
-    py::class_<Lattice>(module, "Lattice",
-                        "Recolours one frame by interpolation within a tolerance, else exactly.")
-        .def(py::init([](const std::shared_ptr<Recolourer>& recolourer) {
-                 return std::make_unique<Lattice>(recolourer);
-             }),
-             py::arg("recolourer").none(false))
-        .def("apply", &apply<Lattice>, py::arg("image"), py::kw_only(), py::arg("strength") = 1.0,
+        .def("apply", &apply, py::arg("image"), py::kw_only(), py::arg("strength") = 1.0,
              py::arg("premultiplied") = false, py::arg("threads") = 1, py::arg("out") = py::none(),
-             py::arg("precision") = "single", py::arg("instructions") = "best",
-             py::arg("conversion") = py::none(), "As Recolourer.apply().")
-        .def_property_readonly("largest_error", &Lattice::largest_error,
-                               "The largest |interpolated - exact| / max(|exact|, 0.1) so far.")
-        .def_property_readonly(
-            "size",
-            [](const Lattice& self) {
-                const Lattice::Size size = self.size();
-                py::dict result;
-                result["cells"] = size.cells;
-                result["cut"] = size.cut;
-                result["parts"] = size.parts;
-                result["exact"] = size.exact;
-                result["colours"] = size.colours;
-                return result;
-            },
-            "Counts of what the lattice holds now.");
-    module.attr("LATTICE_TOLERANCE") = Lattice::kTolerance;
+             py::arg("precision") = "double", py::arg("instructions") = "best",
+             py::arg("conversion") = py::none(),
+             "(h, w, 3 or 4) float32 in and out; threads 0 means one per processor.");
     module.def("straight_colours", &straight_colours, py::arg("image"), py::kw_only(),
                py::arg("premultiplied"),
                "(h, w, 3) float32 of (h, w, 3 or 4): divided by alpha where premultiplied.");

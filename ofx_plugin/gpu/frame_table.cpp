@@ -184,7 +184,7 @@ void add_picks(const Recolourer& map, FrameTable& result) {
 /// What moves colours: the edit, or a matte's reader. Null where nothing does.
 const Recolourer* map_of(const Drawing& drawing) {
     const Recolourer* const map =
-        drawing.options.is_matte() ? drawing.reader.get() : drawing.exact.get();
+        drawing.options.is_matte() ? drawing.reader.get() : drawing.edit.get();
     return map && map->moves() ? map : nullptr;
 }
 

@@ -88,7 +88,7 @@ void remember_host(OfxHost* host) { set_host(host); }
 
 // Raise a version when its parameters change: hosts cache the description under it.
 OfxPlugin g_plugins[] = {
-    {kOfxImageEffectPluginApi, kOfxImageEffectPluginApiVersion, "org.palette4d.Palette4D", 1, 6,
+    {kOfxImageEffectPluginApi, kOfxImageEffectPluginApiVersion, "org.palette4d.Palette4D", 1, 7,
      &remember_host, &main_entry<&grade_action>},
     {kOfxImageEffectPluginApi, kOfxImageEffectPluginApiVersion, "org.palette4d.Analyse", 1, 0,
      &remember_host, &main_entry<&analyse_action>}};

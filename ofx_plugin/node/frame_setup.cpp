@@ -46,7 +46,7 @@ std::string ids_of(const std::vector<Pick>& picks) {
 
 /// Prepares the chosen output. Throws what slicing throws.
 void prepare(FrameSetup& setup, const Params& params, const OutputSettings& settings,
-             LoadedSidecar& loaded, double frame, OfxTime time, Interpolation interpolation) {
+             LoadedSidecar& loaded, double frame, OfxTime time) {
     Drawing& drawing = setup.drawing;
     drawing.options = settings;
     const Sidecar& sidecar = loaded.sidecar();
@@ -96,17 +96,9 @@ void prepare(FrameSetup& setup, const Params& params, const OutputSettings& sett
     }
     EditsAt edits = edits_at(params, sidecar, time);
     add_note(setup, edits.note);
-    const std::shared_ptr<const Recolourer> exact = loaded.recolourer_at(frame, edits.edits);
-    if (exact->moves() && settings.strength != 0) {
-        drawing.edit = drawing.exact = exact;
-        if (interpolation == Interpolation::kAlways ||
-            (interpolation == Interpolation::kWithoutConversion && !drawing.conversion)) {
-            try {
-                drawing.edit = loaded.lattice_at(frame, edits.edits);
-            } catch (const std::bad_alloc&) {
-                add_note(setup, "not enough memory for a lattice: computed exactly");
-            }
-        }
+    const std::shared_ptr<const Recolourer> edit = loaded.recolourer_at(frame, edits.edits);
+    if (edit->moves() && settings.strength != 0) {
+        drawing.edit = edit;
     }
     if (settings.output == Output::kPalette) {
         std::tie(drawing.original, drawing.edited) = loaded.palette_at(frame, edits.edits);
@@ -118,7 +110,7 @@ void prepare(FrameSetup& setup, const Params& params, const OutputSettings& sett
 }  // namespace
 
 FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
-                          Interpolation interpolation, std::optional<double> source_frame) {
+                          std::optional<double> source_frame) {
     FrameSetup setup;
     const Params params(suites, effect);
     const Chosen chosen = chosen_sidecar(params);
@@ -147,7 +139,7 @@ FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, Ofx
     }
     if (at.passes) return setup;
     try {
-        prepare(setup, params, settings, *result.loaded, at.frame, time, interpolation);
+        prepare(setup, params, settings, *result.loaded, at.frame, time);
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& error) {

@@ -10,9 +10,6 @@
 
 namespace palette4d::node {
 
-/// When a setup may use a lattice.
-enum class Interpolation { kNever, kWithoutConversion, kAlways };
-
 struct FrameSetup {
     /// The picture passes through unchanged.
     bool passes = true;
@@ -26,7 +23,6 @@ struct FrameSetup {
 /// The setup of an instance at a time. Reads parameters as rendering allows. Reports problems in
 /// the result; throws std::bad_alloc only.
 FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
-                          Interpolation interpolation = Interpolation::kNever,
                           std::optional<double> source_frame = std::nullopt);
 
 }  // namespace palette4d::node

@@ -14,7 +14,6 @@
 #include "palette4d_command.hpp"
 #include "params.hpp"
 #include "sidecar_choice.hpp"
-#include "speed_mode.hpp"
 #include "status.hpp"
 
 namespace palette4d::node {
@@ -84,11 +83,6 @@ ShownFrame shown_frame(const Params& params, const Chosen& chosen, const HostCli
     if (!std::isfinite(at.frame)) return shown;
     shown.frame = std::clamp(at.frame, static_cast<double>(sidecar.clip.first),
                              static_cast<double>(sidecar.clip.last));
-    if (mode_at(params, time) != Mode::kExact) {
-        const auto lattice =
-            chosen.result.loaded->ready_lattice_at(at.frame, edits_at(params, sidecar, time).edits);
-        if (lattice && lattice->largest_error() > 0) shown.words += "\n" + words_of(*lattice);
-    }
     return shown;
 }
 

@@ -8,7 +8,6 @@
 #include "output_params.hpp"
 #include "param_define.hpp"
 #include "sidecar_choice.hpp"
-#include "speed_mode.hpp"
 
 namespace palette4d::node {
 void define_status(ParamDefiner& define, const Suites& suites) {
@@ -30,7 +29,6 @@ void define_params(const Suites& suites, OfxParamSetHandle params) {
     define.number({kParamStrength, "Strength",
                    "How much of the edit applies: 0 is the original picture, 1 the full edit."},
                   {1, 0, 1, 0, 1}, 0.01, 3, true);
-    define_mode_param(define);
     if (renders_on_gpus(suites)) define_gpu_param(define);
     define_output_params(define);
     define_handle_params(define);

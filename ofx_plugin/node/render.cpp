@@ -21,7 +21,6 @@
 #include "output_params.hpp"
 #include "pixels.hpp"
 #include "sidecar_choice.hpp"
-#include "speed_mode.hpp"
 #include "threads.hpp"
 
 namespace palette4d::node {
@@ -226,9 +225,7 @@ Plan plan_of(const Suites& suites, OfxImageEffectHandle effect, const Properties
     note_source_frame(effect, time, source_frame);
     FrameSetup& setup = plan.setup;
     try {
-        const Mode mode = mode_at(Params(suites, effect), time);
-        setup = frame_setup_at(suites, effect, time, interpolation_of(suites, mode, in_args, whole),
-                               source_frame);
+        setup = frame_setup_at(suites, effect, time, source_frame);
     } catch (...) {
         plan.error = std::current_exception();
         return plan.with(Action::kCopy);

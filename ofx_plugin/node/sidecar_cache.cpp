@@ -28,7 +28,12 @@ namespace fs = std::filesystem;
 using Clock = fs::file_time_type::clock;
 
 /// Prepared frames kept for each sidecar: more than a host renders at a time.
-std::size_t most_frames() { return std::max<std::size_t>(32, 4 * LoadedSidecar::most_lattices()); }
+std::size_t most_frames() {
+    // Called for every tile, and counting processors is a system call.
+    static const std::size_t most =
+        std::max<std::size_t>(32, 4 * std::thread::hardware_concurrency());
+    return most;
+}
 constexpr std::size_t kMaxSidecars = 32;
 constexpr std::size_t kMaxTexts = 8;
 // File times may be as coarse as two seconds (FAT), so newer files may change unnoticed.
@@ -306,55 +311,6 @@ std::shared_ptr<const Recolourer> LoadedSidecar::prepared(const Key& wanted) {
     const std::lock_guard<std::mutex> lock(prepared->building);
     if (!prepared->recolourer) prepared->recolourer = prepare(key);
     return prepared->recolourer;
-}
-
-std::size_t LoadedSidecar::most_lattices() {
-    static const std::size_t most =
-        std::max<std::size_t>(12, std::thread::hardware_concurrency() + 4);
-    return most;  // called for every tile, and counting processors is a system call
-}
-
-std::shared_ptr<const Lattice> LoadedSidecar::lattice_at(double frame, const AppliedEdits& edits) {
-    const Key key = clamped({frame, Purpose::kEdit, 0, edits});
-    const std::shared_ptr<Prepared> prepared = entry(key);
-    std::shared_ptr<const Lattice> lattice;
-    {
-        const std::lock_guard<std::mutex> lock(prepared->building);
-        if (!prepared->recolourer) prepared->recolourer = prepare(key);
-        if (!prepared->lattice) {
-            prepared->lattice = std::make_shared<const Lattice>(prepared->recolourer);
-        }
-        lattice = prepared->lattice;
-    }
-    std::shared_ptr<Prepared> oldest;
-    {
-        const std::lock_guard<std::mutex> lock(mutex_);
-        with_lattice_.remove(prepared);
-        with_lattice_.push_front(prepared);
-        if (with_lattice_.size() > most_lattices()) {
-            oldest = with_lattice_.back();
-            with_lattice_.pop_back();
-        }
-    }
-    if (oldest) {
-        const std::lock_guard<std::mutex> lock(oldest->building);
-        oldest->lattice = nullptr;
-    }
-    return lattice;
-}
-
-std::shared_ptr<const Lattice> LoadedSidecar::ready_lattice_at(double frame,
-                                                               const AppliedEdits& edits) {
-    const Key key = clamped({frame, Purpose::kEdit, 0, edits});
-    std::shared_ptr<Prepared> prepared;
-    {
-        const std::lock_guard<std::mutex> lock(mutex_);
-        const auto at = frames_.find(key);
-        if (at == frames_.end()) return nullptr;
-        prepared = at->second;
-    }
-    const std::lock_guard<std::mutex> lock(prepared->building);
-    return prepared->lattice;
 }
 
 std::shared_ptr<const Recolourer> LoadedSidecar::prepare(const Key& key) const {

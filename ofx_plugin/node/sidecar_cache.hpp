@@ -13,7 +13,6 @@
 #include <utility>
 #include <vector>
 
-#include "lattice/lattice.hpp"
 #include "model/handles.hpp"
 #include "recolour/recolour.hpp"
 #include "sidecar/sidecar.hpp"
@@ -42,13 +41,6 @@ public:
     /// the same frame and edits share one. Throws what slicing throws, and std::invalid_argument
     /// for an unknown handle.
     std::shared_ptr<const Recolourer> recolourer_at(double frame, const AppliedEdits& edits = {});
-    /// The same frame's lattice. Only the most recently used lattices are kept.
-    std::shared_ptr<const Lattice> lattice_at(double frame, const AppliedEdits& edits = {});
-    /// The lattice if it already exists, else null.
-    std::shared_ptr<const Lattice> ready_lattice_at(double frame, const AppliedEdits& edits = {});
-    /// How many lattices are kept: one for each frame that the host's threads may render at a time,
-    /// and a few more. Each takes about ten megabytes.
-    static std::size_t most_lattices();
     /// The same, but it adds the weight of a handle's lineage to the first channel (lineage.hpp).
     std::shared_ptr<const Recolourer> weight_at(double frame, int handle);
     /// The same, but it adds the closest colour of the palette (lineage.hpp).
@@ -66,7 +58,6 @@ private:
     struct Prepared {
         std::mutex building;
         std::shared_ptr<const Recolourer> recolourer;
-        std::shared_ptr<const Lattice> lattice;
     };
     Key clamped(const Key& key) const;
     std::shared_ptr<Prepared> entry(const Key& key);
@@ -78,8 +69,7 @@ private:
     std::mutex mutex_;
     std::map<std::string, std::shared_ptr<LoadedSidecar>> versions_;  ///< those in use so far
     std::map<Key, std::shared_ptr<Prepared>> frames_;
-    std::list<const Key*> recent_;                       ///< keys of frames_, most recent first
-    std::list<std::shared_ptr<Prepared>> with_lattice_;  ///< most recent first
+    std::list<const Key*> recent_;  ///< keys of frames_, most recent first
 };
 
 /// A sidecar, or a sentence that says why there is none.

@@ -276,37 +276,6 @@ class Recolourer:
         image is in the clip's numbers, and the palette in those that it leads to.
         """
 
-class Lattice:
-    """One frame's recolouring by tetrahedral interpolation where that is exact enough.
-
-    Made while it is used, by any number of threads: cells are halved where they err, and what errs
-    still, or lies outside, is recoloured as `Recolourer.apply` does.
-    """
-
-    def __init__(self, recolourer: Recolourer) -> None: ...
-    def apply(
-        self,
-        image: NDArray[np.float32],
-        *,
-        strength: float = ...,
-        premultiplied: bool = ...,
-        threads: int = ...,
-        out: NDArray[np.float32] | None = ...,
-        precision: Literal["single", "double"] = ...,
-        instructions: str = ...,
-        conversion: ColourConversion | None = ...,
-    ) -> F32:
-        """As `Recolourer.apply`; all is exact with precision "double" or strength beyond 0 to 1.
-
-        With a `conversion`, `LATTICE_TOLERANCE` is of the palette's numbers.
-        """
-    @property
-    def largest_error(self) -> float:
-        """Largest abs(interpolated - exact) / max(abs(exact), 0.1) seen so far, at strength 1."""
-    @property
-    def size(self) -> dict[str, int]:
-        """Cells made, cut, their parts, exact parts in use, colours evaluated exactly."""
-
 def draw(
     image: NDArray[np.float32],
     output: Literal["recoloured", "weight", "palette", "outside", "pick"],
@@ -358,9 +327,6 @@ def kernel_table(
     premultiplied: bool = False,
 ) -> tuple[F32, F32]:
     """Return what the kernel reads for a frame: the table and the grids, both flat."""
-
-LATTICE_TOLERANCE: float
-"""What `Lattice.largest_error` is held against."""
 
 def straight_colours(image: NDArray[np.float32], *, premultiplied: bool) -> F32:
     """Return the (h, w, 3) float32 colours of an image (h, w, 3 or 4), not multiplied by alpha.

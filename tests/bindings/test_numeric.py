@@ -287,39 +287,3 @@ def test_the_interpreter_runs_on_while_an_image_is_recoloured(
 ) -> None:
     image = np.random.default_rng(4).uniform(0, 1, (400, 700, 3)).astype(np.float32)
     assert_interpreter_runs_on(lambda: recolourer.apply(image))
-
-
-# Lattice ------------------------------------------------------------------------------------------
-
-
-def test_a_lattice_is_made_while_it_is_used(recolourer: _core.Recolourer) -> None:
-    lattice = _core.Lattice(recolourer)
-    assert lattice.largest_error == 0
-    assert set(lattice.size.values()) == {0}
-    image = np.random.default_rng(1).uniform(0.2, 0.3, (40, 90, 3)).astype(np.float32)
-    exact = recolourer.apply(image, precision="single")
-    found = lattice.apply(image, threads=2)
-    size = lattice.size
-    assert size["cells"] > 0
-    assert size["colours"] > size["cells"]  # a node for each, some at the rim
-    again = lattice.apply(image)
-    assert same_bits(again, found).all()
-    assert lattice.size["cells"] == size["cells"]
-    error = (np.abs(found - exact) / np.maximum(np.abs(exact), 0.1)).max()
-    assert 0 < error <= _core.LATTICE_TOLERANCE
-    assert 0 < lattice.largest_error <= _core.LATTICE_TOLERANCE
-    place = image.copy()
-    lattice.apply(place, out=place)
-    assert same_bits(place, found).all()
-
-
-def test_a_lattice_refuses_what_recolouring_refuses(recolourer: _core.Recolourer) -> None:
-    lattice = _core.Lattice(recolourer)
-    twofold: Any = np.zeros((2, 2, 3))
-    with pytest.raises(ValueError, match=r"expected float32"):
-        lattice.apply(twofold)
-    with pytest.raises(ValueError, match="strength is not finite"):
-        lattice.apply(np.zeros((2, 2, 3), np.float32), strength=float("nan"))
-    nothing: Any = None
-    with pytest.raises(TypeError):
-        _core.Lattice(nothing)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from parity.cases import DOCUMENTS, EDITED, picture, times_of
 
 #: Under qemu a test takes twenty times as long: those of pictures and of instruction sets.
-QUICK = ["picture", "mode", "matte", "outputs", "files", "threads", "unload"]
+QUICK = ["picture", "matte", "outputs", "files", "threads", "unload"]
 
 
 @pytest.mark.parametrize(

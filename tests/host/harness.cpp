@@ -152,10 +152,9 @@ std::vector<unsigned char> recoloured(const palette4d::Sidecar& sidecar, double 
     using namespace palette4d;
     const Slice slice = slice_at(sidecar.polytope, frame);
     Drawing drawing;
-    drawing.exact = std::make_shared<const Recolourer>(
+    drawing.edit = std::make_shared<const Recolourer>(
         slice.rgb, edited_colours(sidecar.polytope, sidecar.edits, slice), slice.faces,
         picks_at(sidecar.edits, slice.frame));
-    drawing.edit = drawing.exact;
     drawing.options.strength = strength;
     drawing.options.clean_up = clean_up;
     if (sidecar.conversion) {

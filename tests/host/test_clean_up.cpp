@@ -28,9 +28,7 @@ std::string text_with_picks(bool moves = false) {
 
 struct Picked : Ready {
     explicit Picked(bool moves = false)
-        : Ready(test::write("picked.p4d.json", text_with_picks(moves))) {
-        set("mode", 1);
-    }
+        : Ready(test::write("picked.p4d.json", text_with_picks(moves))) {}
     std::vector<unsigned char> rendered(const Picture& source, double time = 2) {
         Picture output(source.layout());
         CHECK(instance->render(time, &source, output, source.layout().bounds) == kOfxStatOK);

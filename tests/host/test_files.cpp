@@ -333,12 +333,11 @@ TEST(a_sidecar_rewritten_while_rendering) {
             }
         });
     }
-    // Others draw from lattices, and are told of changes: handles, status and the copy follow too.
+    // Others are told of changes: handles, status and the copy follow too.
     for (int t = 0; t < 2; ++t) {
         threads.emplace_back([&, t] {
             const auto instance = scene.plugin.create();
             instance->set("sidecar", path);
-            instance->set("mode", 2);
             instance->set("embed", t);
             Picture output(scene.layout);
             const char* const changes[] = {"reload", "handle02", "resetHandles"};

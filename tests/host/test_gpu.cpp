@@ -66,9 +66,7 @@ std::string text_with_picks() {
 /// A node that draws a picture here and on a GPU.
 struct Both : Ready {
     Gpu& gpu;
-    explicit Both(Gpu& on, const std::string& of = test::sidecar()) : Ready(of), gpu(on) {
-        set("mode", 1);
-    }
+    explicit Both(Gpu& on, const std::string& of = test::sidecar()) : Ready(of), gpu(on) {}
     std::vector<unsigned char> draw(const Picture* source, const Layout& layout,
                                     const OfxRectI& window, Gpu* on, double time = 3) {
         Picture output(layout);

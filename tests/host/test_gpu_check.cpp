@@ -45,10 +45,7 @@ std::vector<std::unique_ptr<Gpu>> gpus_to_check() {
 }
 
 struct Checked : Ready {
-    explicit Checked(const std::string& of) : Ready(of) {
-        set("mode", 1);
-        set("cleanUp", 0.0);
-    }
+    explicit Checked(const std::string& of) : Ready(of) { set("cleanUp", 0.0); }
     bool by_kernel() {
         CHECK(instance->changed("", "", kOfxChangeTime) == kOfxStatOK);
         const std::string status = instance->text("status");

@@ -194,25 +194,6 @@ TEST(paths_survive_a_project_that_is_saved) {
     EXPECT(said.find(in + "/gone.p4d.json: ") == 0, said);
 }
 
-TEST(auto_is_exact_where_the_cache_does_not_know_who_watches) {
-    for (const bool natron : {false, true}) {
-        Config config;
-        config.natron = natron;
-        Host::get().configure(config);
-        Ready node;
-        node.instance->extra_arguments = {{kOfxImageEffectPropInteractiveRenderStatus, 1}};
-        Layout layout;
-        layout.bounds = rect(0, 0, 24, 16);
-        layout.definition = rect(0, 0, 1920, 1080);
-        Picture source(layout), output(layout);
-        fill(source);
-        CHECK(node.instance->render(2, &source, output, layout.bounds) == kOfxStatOK);
-        const bool exact =
-            output.pixels(layout.bounds) == recoloured(node.parsed, 12, source, layout.bounds);
-        CHECK(exact == natron);
-    }
-}
-
 TEST(a_typed_colour_is_undone_in_one_step) {
     Window window;
     const Colour before = window.colour("handle02");

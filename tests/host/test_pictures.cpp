@@ -159,6 +159,22 @@ TEST(times_offsets_and_strengths) {
     CHECK(!node.instance->effect().persistent_message.empty());
 }
 
+TEST(drafts_and_playback_show_what_a_final_render_writes) {
+    Ready node;
+    Layout layout;
+    layout.bounds = rect(0, 0, 1920, 8);
+    layout.definition = rect(0, 0, 1920, 1080);
+    Picture source(layout), output(layout);
+    fill(source);
+    const auto expected = recoloured(node.parsed, 12, source, layout.bounds);
+    for (const char* said :
+         {kOfxImageEffectPropInteractiveRenderStatus, kOfxImageEffectPropRenderQualityDraft}) {
+        node.instance->extra_arguments = {{said, 1}};
+        CHECK(node.instance->render(2, &source, output, layout.bounds) == kOfxStatOK);
+        CHECK(output.pixels(layout.bounds) == expected);
+    }
+}
+
 TEST(an_unedited_palette_returns_every_bit) {
     Plugin plugin(bundle());
     const auto instance = plugin.create();

@@ -72,7 +72,6 @@ struct Day {
         node->set("output", 3);
         look();
         node->set("output", 0);
-        node->set("mode", 2);
         node->set("keepLightness", 0.5);
         look();
         change("embed", 1);
@@ -89,7 +88,7 @@ struct Day {
     /// The host sets all back, and refuses nothing any more: nothing may have stayed behind.
     std::vector<unsigned char> after() {
         Host::get().configure({});
-        for (const char* name : {"matteIn", "output", "mode", "embed", "handle03On"}) {
+        for (const char* name : {"matteIn", "output", "embed", "handle03On"}) {
             node->set(name, 0);
         }
         node->set("keepLightness", 0.0);

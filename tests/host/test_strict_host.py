@@ -91,31 +91,6 @@ def test_the_nodes_bytes_are_the_cores(
         assert found.tobytes() == expected
 
 
-def test_where_there_is_no_room_for_a_lattice_the_picture_is_exact(
-    strict_host: Path, bundle: Path, tmp_path: Path
-) -> None:
-    path = next(path for path in golden() if path.name == "v1_edited.p4d.json")
-    frame = float(_core.read_sidecar(str(path)).polytope.first_frame) + 1.5
-    image = picture(4, "float")
-    source, output = tmp_path / "in.raw", tmp_path / "out.raw"
-    image.tofile(source)
-    # A lattice reserves more addresses than all of this process gets, the rest of it much less.
-    done = subprocess.run(
-        [
-            *("sh", "-c", 'ulimit -v 300000 && exec "$@"', "sh"),
-            *(strict_host, "render", bundle, path, "--frame", repr(frame), "--set", "mode=2"),
-            *("--width", "31", "--height", "27", "--components", "RGBA", "--depth", "float"),
-            *(source, output),
-        ],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert "not enough memory for a lattice: computed exactly" in done.stdout
-    assert output.read_bytes() == through_the_core(path, frame, image, 1.0, premultiplied=False)
-
-
 def test_the_driver_says_what_is_wrong(strict_host: Path, bundle: Path, tmp_path: Path) -> None:
     (tmp_path / "in.raw").write_bytes(b"too short")
     done = subprocess.run(

@@ -51,7 +51,6 @@ struct Scene : Ready {
 
 TEST(the_node_applies_the_picks) {
     Scene scene(text_with(kPicks, ""));
-    scene.set("mode", 1);
     palette4d::Edits without = scene.parsed.edits;
     without.picks.clear();
     for (const double time : {0.0, 2.0, 5.5, 10.0}) {
@@ -72,7 +71,6 @@ TEST(the_node_applies_the_picks) {
 
 TEST(colours_from_the_host_keep_the_picks) {
     Scene scene(text_with(kPicks, ""));
-    scene.set("mode", 1);
     scene.set("handle02On", 1);
     scene.set("handle02", std::array<double, 3>{0.75, 0.25, 0.5});
     const auto with = [&](bool keep) {
@@ -103,7 +101,6 @@ TEST(mattes_are_of_the_palette_alone) {
 
 TEST(the_user_chooses_a_version) {
     Scene scene(text_with(kPicks, kVersions));
-    scene.set("mode", 1);
     const auto active = scene.render();
     CHECK(active == scene.expected(scene.parsed.edits));
     scene.set("version", std::string("warm 'Gr\u00fcn"));
@@ -137,7 +134,6 @@ TEST(a_version_that_is_not_there_is_said) {
     std::string text = text_with(kPicks, kVersions);
     text.replace(text.find("\"plain\""), 7, "\"warn\"");
     write("clip.p4d.json", text);
-    scene.set("mode", 1);
     CHECK(scene.render() == scene.unchanged() && scene.message().empty());
     write("clip.p4d.json", text_with(kPicks, ""));
     CHECK(scene.render() == scene.unchanged());

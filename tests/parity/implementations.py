@@ -158,31 +158,9 @@ class Core:
         )
 
 
-class Lattice(Core):
-    """The compiled core's interpolation; all but the pictures is as in `Core`."""
-
-    def __init__(self, instructions: str = "best") -> None:
-        super().__init__("single", instructions)
-        self.name = "_core lattice"
-
-    def recolour(
-        self,
-        image: NDArray[np.float32],
-        document: Document,
-        frame: float,
-        strength: float = 1.0,
-        premultiplied: bool = False,
-    ) -> NDArray[np.float32]:
-        return _core.Lattice(self.recolourer(document, frame)).apply(
-            image, strength=strength, premultiplied=premultiplied, instructions=self.instructions
-        )
-
-
 REFERENCE: Implementation = Reference()
 #: Double precision throughout: the bakes.
 CORE: Implementation = Core("double")
 #: Many colours at a time: the node and `palette4d render`.
 FAST: Implementation = Core("single")
-#: Within _core.LATTICE_TOLERANCE: the node where pictures play.
-LATTICE: Implementation = Lattice()
 IMPLEMENTATIONS: list[Implementation] = [REFERENCE, CORE, FAST]

@@ -23,11 +23,9 @@ from parity.implementations import (
     CORE,
     FAST,
     IMPLEMENTATIONS,
-    LATTICE,
     REFERENCE,
     Core,
     Implementation,
-    Lattice,
 )
 from parity.reference import (
     Picked,
@@ -66,41 +64,6 @@ def test_every_instruction_set_gives_the_same_bits(instructions: str, name: str)
         arguments = image, DOCUMENTS[name], frame, 0.9, premultiplied
         found = Core("single", instructions).recolour(*arguments)
         assert same_bits(found, FAST.recolour(*arguments)).all()
-
-
-@pytest.mark.parametrize(("channels", "premultiplied"), [(3, False), (4, False), (4, True)])
-@pytest.mark.parametrize("name", EDITED)
-def test_the_lattice_is_within_its_tolerance_of_the_reference(
-    name: str, channels: int, premultiplied: bool
-) -> None:
-    image = picture(channels)
-    odd = ~np.isfinite(image).all(axis=2)
-    for frame in times_of(name):
-        for strength in (1.0, 0.4):
-            arguments = image, DOCUMENTS[name], frame, strength, premultiplied
-            expected, found = REFERENCE.recolour(*arguments), LATTICE.recolour(*arguments)
-            assert same_bits(found[odd], expected[odd]).all()
-            wanted = expected[~odd].astype(float)
-            error = np.abs(found[~odd] - wanted) / np.maximum(np.abs(wanted), 0.1)
-            if channels == 4:  # alpha may be anything, and is untouched
-                assert same_bits(found[:, :, 3], image[:, :, 3]).all()
-                error = error[:, :3]
-            assert error.max() <= _core.LATTICE_TOLERANCE
-            # What it cannot interpolate has the bits of the exact one, here that beyond its margin.
-            with np.errstate(all="ignore"):
-                straight = image[:, :, :3] / (image[:, :, 3:] if premultiplied else 1)
-                outside = (np.abs(straight - 0.5) > 3).any(axis=2)
-            exact = FAST.recolour(*arguments)
-            assert same_bits(found[outside], exact[outside]).all()
-
-
-@pytest.mark.parametrize("name", EDITED)
-@pytest.mark.parametrize("instructions", _core.instruction_sets())
-def test_every_instruction_set_interpolates_to_the_same_bits(instructions: str, name: str) -> None:
-    for channels, premultiplied in ((3, False), (4, True)):
-        arguments = picture(channels), DOCUMENTS[name], times_of(name)[2], 0.9, premultiplied
-        found = Lattice(instructions).recolour(*arguments)
-        assert same_bits(found, LATTICE.recolour(*arguments)).all()
 
 
 @IMPLEMENTED
@@ -198,7 +161,7 @@ def test_colours_beyond_all_mattes_keep_their_bits(name: str) -> None:
             taken[y, x] = sum(between(pick.matte, at) for pick in picks.picks)
         beyond = taken < 1e-12
         assert beyond.sum() > 0
-        for code in (CORE, FAST, LATTICE):
+        for code in (CORE, FAST):
             found = code.recolour(image, document, frame)
             assert same_bits(found, image)[beyond].all()
             if (~beyond).any():
@@ -211,10 +174,9 @@ def test_picked_colours_meet_their_targets(name: str) -> None:
     picks = picks_at(document, frame)
     image = np.array([[pick.colour for pick in picks.picks]], np.float32)
     targets = np.array([[pick.colour + pick.change for pick in picks.picks]])
-    for code in (REFERENCE, CORE, FAST, LATTICE):
+    for code in (REFERENCE, CORE, FAST):
         found = code.recolour(image, document, frame)
-        tolerance = _core.LATTICE_TOLERANCE if code is LATTICE else 2e-4
-        np.testing.assert_allclose(found, targets, rtol=0, atol=tolerance)
+        np.testing.assert_allclose(found, targets, rtol=0, atol=2e-4)
 
 
 @pytest.mark.parametrize("curve", [None, (-0.5, 1.5, [0.0, 0.1, 0.5, 0.7, 1.0])])

@@ -151,7 +151,7 @@ void copy_pixels(const ConstImageView& in, const ImageView& out) {
 /// has all of it where the palette moves, and is not drawn where only picks move colours.
 double own_share(const Drawing& drawing) {
     const double amount = drawing.clean_up->amount();
-    return drawing.exact->palette_moves() ? -amount : 1 - amount;
+    return drawing.edit->palette_moves() ? -amount : 1 - amount;
 }
 
 /// Adds strength times `change`, times alpha where premultiplied, to a row of pixels. Channels that
@@ -178,7 +178,7 @@ void add_steps(const std::vector<float>& change, bool premultiplied, float stren
 /// The edit with Drawing::clean_up, without a conversion.
 void draw_cleaned(const ConstImageView& in, const ImageView& out, bool premultiplied,
                   const Drawing& drawing, const RowPlace& place) {
-    if (drawing.exact->palette_moves()) {
+    if (drawing.edit->palette_moves()) {
         RecolourOptions options;
         options.strength = drawing.options.strength;
         options.premultiplied = premultiplied;
@@ -215,12 +215,12 @@ void draw_converted(const ConstImageView& in, const ImageView& out, bool premult
         const float* const from = pixel_row(in, y);
         const bool cleaned = drawing.clean_up->change(from, place.x, place.y + place.step * y,
                                                       in.width, own, change.data());
-        if (!cleaned && !drawing.exact->palette_moves()) continue;
+        if (!cleaned && !drawing.edit->palette_moves()) continue;
         if (!cleaned) std::fill(change.begin(), change.end(), 0.0f);
         const Pixels row{from, nullptr, width, channels, premultiplied};
         before = straight_colours(row, &conversion);
         after = before;
-        if (drawing.exact->palette_moves()) {
+        if (drawing.edit->palette_moves()) {
             drawing.edit->apply({before.data(), in.width, 1, 3, 0},
                                 {after.data(), in.width, 1, 3, 0}, options);
         }
@@ -252,7 +252,7 @@ std::shared_ptr<CleanUp> make_clean_up(const Drawing& drawing, CleanUp::Format f
                                        const CleanUp::Place& place) {
     const DrawingOptions& options = drawing.options;
     const bool matte = options.output == Output::kPick;
-    const std::shared_ptr<const Recolourer>& map = matte ? drawing.reader : drawing.exact;
+    const std::shared_ptr<const Recolourer>& map = matte ? drawing.reader : drawing.edit;
     if (options.clean_up == 0 || options.passes() || (options.is_matte() && !matte) || !map ||
         map->picks().picks.empty() || (!matte && options.strength == 0)) {
         return nullptr;
@@ -335,7 +335,7 @@ void draw_picture(const ConstImageView& in, const ImageView& out, Drawing drawin
     const DrawingOptions& options = drawing.options;
     if (options.passes()) {
         drawing.options = {};
-        drawing.edit = drawing.exact = nullptr;
+        drawing.edit = nullptr;
     }
     const auto channels = static_cast<std::size_t>(in.channels);
     const std::size_t row = static_cast<std::size_t>(in.width) * channels;

@@ -36,10 +36,8 @@ struct DrawingOptions {
 /// What one frame draws. Read-only, so that threads share it.
 struct Drawing {
     DrawingOptions options;
-    /// The edit, exact or interpolated; null where colours do not change.
-    std::shared_ptr<const ColourMap> edit;
-    /// The exact edit; its picks are cleaned up. Null where colours do not change.
-    std::shared_ptr<const Recolourer> exact;
+    /// The edit, whose picks are cleaned up; null where colours do not change.
+    std::shared_ptr<const Recolourer> edit;
     /// For mattes: weight_reader(), surface_reader() or matte_at().
     std::shared_ptr<const Recolourer> reader;
     /// From the picture's code values to the palette's; null where they are equal.

@@ -25,12 +25,12 @@ std::size_t slot(const Vec3& p) {
 }  // namespace
 
 DoubleWorker::DoubleWorker(const Recolourer& recolourer, const RecolourOptions& options,
-                           int channels, bool picks)
+                           int channels)
     : recolourer_(recolourer),
       strength_(options.strength),
       divide_(options.premultiplied),
       channels_(channels),
-      picks_(picks && !recolourer.plan().twofold.picks.plan().empty()),
+      picks_(!recolourer.plan().twofold.picks.plan().empty()),
       plan_(recolourer.plan().twofold.picks.plan()),
       weights_(recolourer.original().size()) {}
 

@@ -12,13 +12,12 @@ namespace palette4d {
 /// on the colour alone, so the cache does not change results.
 class DoubleWorker final : public RowWorker {
 public:
-    /// `recolourer` must outlive this and move some colour. Its picks count only with `picks`.
-    DoubleWorker(const Recolourer& recolourer, const RecolourOptions& options, int channels,
-                 bool picks);
+    /// `recolourer` must outlive this and move some colour.
+    DoubleWorker(const Recolourer& recolourer, const RecolourOptions& options, int channels);
 
     void row(const float* from, float* to, int width) override;
     void finish() override {}
-    RecolourCounts counts() const override { return {0, 0, 0, count_}; }
+    RecolourCounts counts() const override { return {0, 0, count_}; }
     /// Recolours one pixel that is recolourable().
     void recolour(const float* from, float* to);
 

@@ -23,19 +23,17 @@ void stay(const Plan<T>&, Block<T>& block, int, T, T, T*) {
 /// Collects pixels in blocks and sorts them into inside and outside the palette; one kernel for
 /// each computes the displacement. Pixels whose error a kernel cannot guarantee go to the next
 /// stage: float, double, one by one. A pixel's stage depends on its colour alone.
-class Pipeline final : public FloatWorker {
+class Pipeline final : public RowWorker {
 public:
-    Pipeline(const Recolourer& recolourer, const RecolourOptions& options, int channels, bool picks)
+    Pipeline(const Recolourer& recolourer, const RecolourOptions& options, int channels)
         : divide_(options.premultiplied),
           channels_(channels),
           kernels_(kernels_of<MvcKernels>(options.instructions)),
-          one_by_one_(recolourer, options, channels, picks),
+          one_by_one_(recolourer, options, channels),
           twofold_(recolourer.plan().twofold, kernels_.twofold,
-                   picks ? kernels_of<PickKernels>(options.instructions).add_twofold : nullptr,
-                   options, one_by_one_),
+                   kernels_of<PickKernels>(options.instructions).add_twofold, options, one_by_one_),
           single_(recolourer.plan().single, kernels_.single,
-                  picks ? kernels_of<PickKernels>(options.instructions).add_single : nullptr,
-                  options, twofold_) {}
+                  kernels_of<PickKernels>(options.instructions).add_single, options, twofold_) {}
 
     void row(const float* from, float* to, int width) override {
         constexpr int kSize = Block<float>::kSize;
@@ -46,22 +44,13 @@ public:
         }
     }
 
-    void pixel(const float* from, float* to) override {
-        if (channels_ == 4) to[3] = from[3];
-        if (recolourable(from, divide_)) {
-            single_.recolour(from, to);
-        } else {
-            for (int c = 0; c < 3; ++c) to[c] = from[c];
-        }
-    }
-
     void finish() override {
         single_.finish();
         twofold_.finish();
     }
 
     RecolourCounts counts() const override {
-        return {0, single_.count(), twofold_.count(), one_by_one_.counts().one};
+        return {single_.count(), twofold_.count(), one_by_one_.counts().one};
     }
 
 private:
@@ -71,7 +60,6 @@ private:
                                   PickKernels::Channels<T>, int);
 
     public:
-        /// Without `add_picks` there are none.
         Stage(const PlanOf<T>& plan, const Kernels<T>& kernels, AddPicks add_picks,
               const RecolourOptions& options, Next& next)
             : plan_(plan.palette.plan()),
@@ -253,10 +241,9 @@ private:
 
 }  // namespace
 
-std::unique_ptr<FloatWorker> float_worker(const Recolourer& recolourer,
-                                          const RecolourOptions& options, int channels,
-                                          bool picks) {
-    return std::make_unique<Pipeline>(recolourer, options, channels, picks);
+std::unique_ptr<RowWorker> float_worker(const Recolourer& recolourer,
+                                        const RecolourOptions& options, int channels) {
+    return std::make_unique<Pipeline>(recolourer, options, channels);
 }
 
 }  // namespace palette4d

@@ -7,14 +7,8 @@
 
 namespace palette4d {
 
-/// Single pixels too, with the same bits as row().
-class FloatWorker : public RowWorker {
-public:
-    virtual void pixel(const float* from, float* to) = 0;
-};
-
-/// `recolourer` must outlive the worker and move some colour. Its picks count only with `picks`.
-std::unique_ptr<FloatWorker> float_worker(const Recolourer& recolourer,
-                                          const RecolourOptions& options, int channels, bool picks);
+/// `recolourer` must outlive the worker and move some colour.
+std::unique_ptr<RowWorker> float_worker(const Recolourer& recolourer,
+                                        const RecolourOptions& options, int channels);
 
 }  // namespace palette4d

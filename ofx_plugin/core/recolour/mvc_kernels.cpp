@@ -203,11 +203,7 @@ void inside(const Plan<T>& plan, Block<T>& block, int count, T tolerance, T shel
             lowest = min(here, lowest);
         }
         Lanes<T> side = select(lowest > zero, one, zero - one);
-        if (plan.beyond) {
-            side = one;
-        } else if (!plan.convex) {
-            side = side_by_ray(plan, shell, vertices, edges, volume);
-        }
+        if (!plan.convex) side = side_by_ray(plan, shell, vertices, edges, volume);
         if (!any(side > zero)) {
             store(block.verdict + at, side);
             continue;

@@ -78,7 +78,6 @@ struct Plan {
     int vertex_count, mover_count, edge_count, face_count;
     int segment_count, triangle_count;
     bool convex;  ///< faces' heights test for the inside; otherwise rays do
-    bool beyond;  ///< every colour is taken for inside; not with convex
     bool solid;   ///< false for one or two colours and flat palettes: every colour is outside
     T size;       ///< diagonal of the bounding box, or the largest coordinate if that is more
     T steepness;  ///< estimate of the largest displacement per unit of length

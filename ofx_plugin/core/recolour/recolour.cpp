@@ -81,9 +81,9 @@ Vec3 Recolourer::displaced(const Vec3& p, double strength) const {
 
 std::unique_ptr<RowWorker> Recolourer::worker(const RecolourOptions& options, int channels) const {
     if (options.precision == Precision::kDouble) {
-        return std::make_unique<DoubleWorker>(*this, options, channels, true);
+        return std::make_unique<DoubleWorker>(*this, options, channels);
     }
-    return float_worker(*this, options, channels, true);
+    return float_worker(*this, options, channels);
 }
 
 }  // namespace palette4d

@@ -14,21 +14,30 @@ namespace palette4d {
 struct RecolourPlan;
 
 /// Prepared once per frame; const, so many threads share it.
-class Recolourer final : public ColourMap {
+class Recolourer {
 public:
     /// n original and n edited colours, the faces between them, and any picks, all finite. Throws
     /// std::invalid_argument when they do not match.
     Recolourer(std::vector<Vec3> original, const std::vector<Vec3>& edited, std::vector<Face> faces,
                FramePicks picks = {});
-    ~Recolourer() override;
+    ~Recolourer();
     Recolourer(const Recolourer&) = delete;
     Recolourer& operator=(const Recolourer&) = delete;
 
-    bool moves() const override { return palette_moves() || !picks_.picks.empty(); }
+    /// False when no colour moves; apply() then copies.
+    bool moves() const { return palette_moves() || !picks_.picks.empty(); }
     /// Whether some vertex moves.
     bool palette_moves() const { return !displaced_.empty(); }
     const FramePicks& picks() const { return picks_; }
-    std::unique_ptr<RowWorker> worker(const RecolourOptions& options, int channels) const override;
+    /// `in` and `out` have the same size and channels, and may be the same memory. A pixel's result
+    /// depends on that pixel and the options only, not on threads, position or processor. Colours
+    /// with NaN or infinity pass; so do premultiplied ones whose alpha is 0 or not finite. Throws
+    /// std::invalid_argument for mismatched views or instructions that this processor lacks.
+    RecolourCounts apply(const ConstImageView& in, const ImageView& out,
+                         const RecolourOptions& options) const;
+    /// A worker for pixels of this many channels. Ignores options.threads and options.conversion;
+    /// options.premultiplied is true for four channels only. This must outlive the worker.
+    std::unique_ptr<RowWorker> worker(const RecolourOptions& options, int channels) const;
     const std::vector<Vec3>& original() const { return body_.rgb(); }
     /// For the core's own sources; the plan exists only where some colour moves.
     const PaletteBody& body() const { return body_; }

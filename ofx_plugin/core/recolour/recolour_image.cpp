@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <mutex>
 #include <stdexcept>
 #include <string>
@@ -11,6 +12,7 @@
 
 #include "model/alpha.hpp"
 #include "model/vec3.hpp"
+#include "recolour/recolour.hpp"
 #include "threads/share_rows.hpp"
 
 namespace palette4d {
@@ -78,13 +80,13 @@ void copy_rows(const ConstImageView& in, const ImageView& out) {
 /// recoloured as one row.
 class ConvertedRows : public RowWorker {
 public:
-    ConvertedRows(const ColourMap& map, const RecolourOptions& options, int channels)
+    ConvertedRows(const Recolourer& recolourer, const RecolourOptions& options, int channels)
         : conversion_(*options.conversion),
           premultiplied_(options.premultiplied),
           channels_(channels) {
         RecolourOptions straight = options;
         straight.premultiplied = false;
-        worker_ = map.worker(straight, 3);
+        worker_ = recolourer.worker(straight, 3);
         pixels_.reserve(kPiece);
         before_.reserve(3 * kPiece);
     }
@@ -163,8 +165,8 @@ Vec3 straight_colour(const float* pixel, bool premultiplied) {
             straight<double>(pixel[2], alpha)};
 }
 
-RecolourCounts ColourMap::apply(const ConstImageView& in, const ImageView& out,
-                                const RecolourOptions& given) const {
+RecolourCounts Recolourer::apply(const ConstImageView& in, const ImageView& out,
+                                 const RecolourOptions& given) const {
     RecolourOptions options = given;
     options.premultiplied = options.premultiplied && in.channels == 4;
     check_recolouring(in, out, options);

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
 
 #include "convert/colour_conversion.hpp"
 #include "model/alpha.hpp"
@@ -49,14 +48,11 @@ struct RecolourOptions {
 
 /// How many colours of an apply() each method computed; copied colours are not counted.
 struct RecolourCounts {
-    long long interpolated = 0;  ///< by a Lattice
-    long long single = 0;        ///< many at a time in float
-    long long twofold = 0;       ///< many at a time in double
-    long long one = 0;           ///< by PaletteBody
+    long long single = 0;   ///< many at a time in float
+    long long twofold = 0;  ///< many at a time in double
+    long long one = 0;      ///< by PaletteBody
 
-    long long exact() const { return single + twofold + one; }
     RecolourCounts& operator+=(const RecolourCounts& other) {
-        interpolated += other.interpolated;
         single += other.single;
         twofold += other.twofold;
         one += other.one;
@@ -73,25 +69,6 @@ public:
     virtual void row(const float* from, float* to, int width) = 0;
     virtual void finish() = 0;
     virtual RecolourCounts counts() const = 0;
-};
-
-/// A map from colours to colours. Thread-safe.
-class ColourMap {
-public:
-    virtual ~ColourMap() = default;
-    /// False when no colour moves; apply() then copies.
-    virtual bool moves() const = 0;
-    /// A worker for pixels of this many channels. Ignores options.threads and options.conversion;
-    /// options.premultiplied is true for four channels only. The map must outlive the worker.
-    virtual std::unique_ptr<RowWorker> worker(const RecolourOptions& options,
-                                              int channels) const = 0;
-
-    /// `in` and `out` have the same size and channels, and may be the same memory. A pixel's result
-    /// depends on that pixel and the options only, not on threads, position or processor. Colours
-    /// with NaN or infinity pass; so do premultiplied ones whose alpha is 0 or not finite. Throws
-    /// std::invalid_argument for mismatched views or instructions that this processor lacks.
-    RecolourCounts apply(const ConstImageView& in, const ImageView& out,
-                         const RecolourOptions& options) const;
 };
 
 /// Whether the pixel can be recoloured: finite colours, and an alpha that can divide them.

@@ -12,8 +12,7 @@
 namespace palette4d {
 namespace {
 
-/// Rows that a thread takes at once. Adjacent rows share colours: on neighbouring rows, threads
-/// would wait for each other's Lattice cells.
+/// Rows that a thread takes at once.
 constexpr int kMostRowsAtOnce = 16;
 
 }  // namespace

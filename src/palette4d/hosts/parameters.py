@@ -117,7 +117,6 @@ ALL: tuple[Parameter, ...] = (
         ("Input space", "Palette space", "Scene-linear"),
         "Input space",
     ),
-    Choice("mode", "Mode", ("Auto", "Exact", "Lattice"), "Auto"),
     EDITS_FROM,
     *TIME,
     *_handles(),

@@ -3,11 +3,10 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <memory>
 #include <vector>
 
 #include "check.hpp"
-#include "lattice/lattice.hpp"
+#include "recolour/recolour.hpp"
 #include "shapes.hpp"
 
 using namespace palette4d;
@@ -124,7 +123,7 @@ TEST(whatever_an_edit_asks_for_stays_a_number) {
 }
 
 /// apply() between kChain and the way back.
-RecolourCounts converted(const ColourMap& map, const ConstImageView& in, const ImageView& out,
+RecolourCounts converted(const Recolourer& map, const ConstImageView& in, const ImageView& out,
                          RecolourOptions options) {
     options.conversion = &kChain;
     return map.apply(in, out, options);
@@ -188,44 +187,7 @@ TEST(threads_and_pieces_do_not_show) {
     CHECK(std::memcmp(one.data.data(), many.data.data(), one.data.size() * sizeof(float)) == 0);
 }
 
-TEST(a_lattice_recolours_between_two_conversions_too) {
-    Random random(6);
-    Image image{40000, 3, {}};
-    for (int i = 0; i < image.width; ++i) {
-        const Vec3 colour = chain().to_clip(random.colour(-0.05, 1.05));
-        for (const double x : colour) image.data.push_back(static_cast<float>(x));
-    }
-    Image exact = image, found = image;
-    std::vector<Vec3> edited = cube().rgb;
-    edited[7] = {1.2, 0.7, 0.9};
-    edited[1] = {0.1, 0.2, 0.6};
-    const auto recolourer = std::make_shared<Recolourer>(cube().rgb, edited, cube().faces);
-    const Lattice lattice(recolourer);
-    converted(*recolourer, image.in(), exact.out(), {});
-    const RecolourCounts counts = converted(lattice, image.in(), found.out(), {});
-    CHECK_EQUAL(counts.interpolated + counts.exact(), 40000LL);
-    CHECK(counts.interpolated > 2 * counts.exact());
-    CHECK(found.data != exact.data);
-    const auto palette = [](const Image& of, std::size_t i) {
-        return kChain.to_palette({of.data[i], of.data[i + 1], of.data[i + 2]});
-    };
-    for (std::size_t i = 0; i < image.data.size(); i += 3) {
-        const Vec3 a = palette(found, i), b = palette(exact, i);
-        for (std::size_t c = 0; c < 3; ++c) {
-            // And what the clip's numbers lose as floats.
-            CHECK_NEAR(a[c], b[c], Lattice::kTolerance * std::max(std::abs(b[c]), 0.1) + 2e-5);
-        }
-    }
-    Image many = image;
-    RecolourOptions options;
-    options.threads = 3;
-    const std::ptrdiff_t row = 100 * 3 * static_cast<std::ptrdiff_t>(sizeof(float));
-    converted(lattice, {many.data.data(), 100, 400, 3, row}, {many.data.data(), 100, 400, 3, row},
-              options);
-    CHECK(std::memcmp(many.data.data(), found.data.data(), many.data.size() * sizeof(float)) == 0);
-}
-
-TEST(what_a_lattice_does_not_move_keeps_its_bits_between_conversions) {
+TEST(what_does_not_move_keeps_its_bits_between_conversions) {
     // Nearest to a face whose colours stay where they are, in numbers that are not exact.
     std::vector<Vec3> edited = cube().rgb;
     std::vector<float> colours;
@@ -239,10 +201,9 @@ TEST(what_a_lattice_does_not_move_keeps_its_bits_between_conversions) {
         for (const double x : chain().to_clip(colour)) colours.push_back(static_cast<float>(x));
         colours.push_back(i % 2 ? 0.7f : 1.0f);
     }
-    const auto recolourer = std::make_shared<Recolourer>(cube().rgb, edited, cube().faces);
-    const Lattice lattice(recolourer);
+    const Recolourer recolourer(cube().rgb, edited, cube().faces);
     Image image{3000, 4, colours};
-    converted(lattice, image.in(), image.out(), {});
+    converted(recolourer, image.in(), image.out(), {});
     int moved = 0;
     for (std::size_t i = 0; i < 3000; ++i) {
         const bool same = std::memcmp(&image.data[4 * i], &colours[4 * i], 16) == 0;
@@ -250,18 +211,6 @@ TEST(what_a_lattice_does_not_move_keeps_its_bits_between_conversions) {
         moved += !same;
     }
     CHECK(moved > 1400);
-
-    Image odd{4, 4, {0.1f, 0.2f, 0.3f, 0, kNan, 0, 0, 1, 0, kInf, 0, 1, 0.1f, 0.2f, 0.3f, kInf}};
-    const Image before = odd;
-    RecolourOptions options;
-    options.premultiplied = true;
-    converted(lattice, odd.in(), odd.out(), options);
-    CHECK(std::memcmp(odd.data.data(), before.data.data(), 64) == 0);
-    Image one{1, 4, {0.4f, 0.3f, 0.2f, 1}}, half{1, 4, {0.2f, 0.15f, 0.1f, 0.5f}};
-    converted(lattice, one.in(), one.out(), options);
-    converted(lattice, half.in(), half.out(), options);
-    CHECK(one.data[2] != 0.2f);
-    for (std::size_t c = 0; c < 3; ++c) CHECK_NEAR(half.data[c], one.data[c] / 2, 1e-7);
 }
 
 TEST(what_has_no_way_back_is_refused) {

@@ -39,9 +39,8 @@ Drawing picked_drawing(bool moves = false, double strength = 1) {
     if (moves) edited[3] = {0.1, 0.2, 0.8};
     Drawing drawing;
     drawing.options.strength = strength;
-    drawing.exact =
+    drawing.edit =
         std::make_shared<const Recolourer>(mesh.rgb, edited, mesh.faces, picks_at(edits, 0));
-    drawing.edit = drawing.exact;
     drawing.original = mesh.rgb;
     drawing.edited = edited;
     return drawing;
@@ -76,7 +75,7 @@ Image cleaned_picture(const Image& in, const Drawing& drawing, bool premultiplie
 std::vector<float> change(const Image& image, const Drawing& drawing, int left, int bottom,
                           const Area& area, int width, int height, int threads = 1) {
     const Area whole = {left, bottom, left + image.width, bottom + image.height};
-    CleanUp clean_up(drawing.exact, nullptr, 1, {image.channels, image.channels == 4},
+    CleanUp clean_up(drawing.edit, nullptr, 1, {image.channels, image.channels == 4},
                      {whole, whole, area, width, height});
     const auto at = [&](int x, int y) {
         return &image.data[static_cast<std::size_t>((y - bottom) * image.width + x - left) *
@@ -207,8 +206,7 @@ TEST(nothing_is_cleaned_up_without_picks) {
     const Image in = picture(60, 40, 4);
     Drawing drawing = picked_drawing(true);
     const Mesh mesh = tetrahedron();
-    drawing.edit = drawing.exact =
-        std::make_shared<const Recolourer>(mesh.rgb, drawing.edited, mesh.faces);
+    drawing.edit = std::make_shared<const Recolourer>(mesh.rgb, drawing.edited, mesh.faces);
     const Area whole = {0, 0, 60, 40};
     CHECK(!make_clean_up(drawing, {4, false}, {whole, whole, whole, 4, 4}));
     Drawing off = drawing;

@@ -9,7 +9,6 @@
 
 #include "check.hpp"
 #include "images.hpp"
-#include "lattice/lattice.hpp"
 #include "picks.hpp"
 #include "recolour/recolour.hpp"
 #include "shapes.hpp"
