@@ -6,6 +6,7 @@ error than `Palette4dError` is a fault. `many` gives them mutations of tests/fuz
 
 from __future__ import annotations
 
+import argparse
 import collections
 import contextlib
 import io
@@ -24,6 +25,7 @@ from palette4d.lut_export.series import Series
 from palette4d.lut_export.writers import Description
 
 from palette4d.cli import export
+from palette4d.cli.main import build_parser
 from palette4d.common.errors import Palette4dError
 from palette4d.shows import manifest as manifests
 from palette4d.shows import timeline_clips, timeline_shots
@@ -68,7 +70,7 @@ def index(path: Path, folder: Path) -> str:
     done = Series(path, document, [], sorted(entries), {})
     with contextlib.redirect_stderr(io.StringIO()):
         export.report(done)
-        export.warn([done])
+        export.warn(argparse.Namespace(parser=build_parser("export")), [done])
     series_index.write_index(folder / "copy.json", header, entries)
     return "accepted"
 

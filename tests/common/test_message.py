@@ -19,6 +19,7 @@ from palette4d.cli.main import build_parser
 from palette4d.cli.terminal import option_of
 from palette4d.common.errors import Arg, Message, Palette4dError, SidecarError
 from palette4d.grade.handle_edits import How
+from palette4d.grade.pick_edits import Asked
 
 FRAMES, FORCE = Arg("frames"), Arg("force", True)
 
@@ -98,6 +99,10 @@ def test_messages_name_arguments_that_the_api_has() -> None:
     calls += [call for name, call in inspect.getmembers(palette4d.Document, inspect.isroutine)]
     public = [call for call in calls if not call.__name__.startswith("_")]
     known = {name for call in public for name in inspect.signature(call).parameters}
-    known |= {*How.__annotations__, *(option.field for option in OPTIONS.values())}
+    known |= {
+        *How.__annotations__,
+        *Asked.__annotations__,
+        *(option.field for option in OPTIONS.values()),
+    }
     assert len(named) > 40
     assert named - known == {"detect_shots"}

@@ -199,14 +199,14 @@ def test_a_jump_decodes_from_the_key_frame_before(tmp_path, monkeypatch):
 
 
 def test_variable_rate_is_noted(tmp_path):
-    stamps = [0, 1, 2, 8, 9, 30]
+    stamps = [*range(30), 36, 37, *range(58, 88)]
     path = write_movie(
-        tmp_path / "a.mkv", "ffv1", "bgr0", noise(6, channels=4), "bgr0", stamps=stamps
+        tmp_path / "a.mkv", "ffv1", "bgr0", noise(62, channels=4), "bgr0", stamps=stamps
     )
     clip = open_clip(str(path))
-    assert clip.frames == [0, 1, 2, 3, 4, 5]
+    assert clip.frames == list(range(62))
     assert any("rate varies" in note for note in clip.notes)
-    assert len(list(clip)) == 6
+    assert len(list(clip)) == 62
 
 
 @pytest.mark.parametrize(("degrees", "turns"), [(90, 1), (-90, -1), (180, 2)])

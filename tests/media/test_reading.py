@@ -125,10 +125,10 @@ def test_a_sidecar_remembers_how_its_clip_is_read(tmp_path):
     document = analyze(f"{source}?matrix=709", allow_cuts=True, vertices=8)
     document.save(tmp_path / "s.p4d.json")
     kept = Document.load(tmp_path / "s.p4d.json")
-    assert kept.core.clip["source"].endswith("s.mp4?matrix=709")
+    assert kept.grade.core.clip["source"].endswith("s.mp4?matrix=709")
     expected = open_clip(f"{source}?matrix=709").read(1)
     for given in (None, str(source)):  # found again, and named by the user
-        found = find_clip(tmp_path / "s.p4d.json", kept.core.clip, given)
+        found = find_clip(tmp_path / "s.p4d.json", kept.grade.core.clip, given)
         np.testing.assert_array_equal(found.read(1), expected)
     rendering.render(kept, source, tmp_path / "o.#.exr")
     np.testing.assert_array_equal(open_clip(str(tmp_path / "o.1.exr")).read(1), expected)
