@@ -139,6 +139,16 @@ def test_super_whites_and_sub_blacks_survive(tmp_path):
     render(source, tmp_path / "o.##.exr")
     floats = open_clip(str(tmp_path / "o.01.exr")).read(1)
     np.testing.assert_allclose(floats[..., 1], (before - 64.0) / 876, atol=1e-4)
+    render(tmp_path / "o.##.exr", tmp_path / "back.mov")
+    np.testing.assert_allclose(samples(tmp_path / "back.mov")[0].astype(int), before, atol=5)
+
+
+def test_highlights_of_scene_linear_frames_keep_their_hue(tmp_path):
+    pixels = np.full((128, 256, 3), (8.0, 0.2, 0.1), np.float32)
+    write_image(tmp_path / "s.1.exr", pixels, oiio__ColorSpace="lin_rec709_scene")
+    render(tmp_path / "s.#.exr", tmp_path / "o.mov", codec="prores4444")
+    found = open_clip(str(tmp_path / "o.mov")).read(0)[64, 128]
+    np.testing.assert_allclose(found, (1, 0.2, 0.1), atol=0.02)
 
 
 @pytest.mark.parametrize("full_range", [False, True])
@@ -198,6 +208,7 @@ def test_fields_stay_fields(tmp_path, fields, name, codec):
     after = open_clip(str(tmp_path / name))
     assert after.stated.fields == fields
     assert order_of_frames(tmp_path / name) in (fields, None)
+    assert said(tmp_path / name).order in {"tff": ("tt", "tb"), "bff": ("bb", "bt")}[fields]
     np.testing.assert_allclose(after.read(1)[4:-4, 8:-8], before.read(1)[4:-4, 8:-8], atol=0.03)
     assert np.abs(after.read(1)[50, 100] - after.read(1)[51, 100]).max() > 0.5
 

@@ -13,6 +13,7 @@ from palette4d.media.clip import Clip, Image
 from palette4d.media.clip_base import F32
 from palette4d.media.clip_images import ImageClip
 from palette4d.media.clip_movie import MovieClip
+from palette4d.media.colour_space import FLOATS
 from palette4d.media.movie_writer import Delivery, movie_writer
 from palette4d.media.sound import Sound
 from palette4d.media.stated import Stated
@@ -99,8 +100,13 @@ def movie_notes(clip: Clip, delivery: Delivery, size: tuple[int, int]) -> list[s
 
 
 def _stated(clip: Clip, rate: Fraction) -> Stated:
-    """Return what a movie of the clip's frames states; its timecode is that of the first frame."""
+    """Return what a movie of the clip's frames states; its timecode is that of the first frame.
+
+    Floats have room above white and below black, as Y'CbCr has; highlights of scene-linear clips
+    are so far out of it that they would lose their hue.
+    """
     start = start_timecode(clip) or ""
     if start and clip.is_movie:
         start = moved(start, clip.frames[0], rate)
-    return replace(clip.stated, timecode=start)
+    display = clip.depth in FLOATS and "linear" not in clip.encoding
+    return replace(clip.stated, timecode=start, headroom=clip.stated.headroom or display)

@@ -207,6 +207,8 @@ def _stream(movie: Any, size: tuple[int, int], rate: Fraction, how: Delivery) ->
         options["crf"] = str(how.crf)
     if stated.fields:
         options["flags"] = "+ildct+ilme"
+        if stated.fields == "bff" and how.codec.encoder == "libx264":
+            options["x264-params"] = "bff=1"  # x264 reads the first picture's flag too late
     if stated.hdr10 and "x265-params" in options:
         options["x265-params"] += f":{stated.hdr10}"
     stream = movie.add_stream(how.codec.encoder, rate=rate, options=options)
