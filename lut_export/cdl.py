@@ -5,6 +5,7 @@ least-squares fit of the relative error (`bake_error`) finds them. It uses the c
 that time, or the dense grid without a clip. The remaining error is stated as for a 3D LUT.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +37,9 @@ _WRITTEN_AS = {
     "ccc": "ColorCorrectionCollection",
     "cdl": "ColorDecisionList",
 }
+
+#: The numbers of a correction in the text that OpenColorIO writes.
+_NUMBERS = re.compile(r"(?<=>)[^<>]+(?=</(?:Slope|Offset|Power|Saturation)>)")
 
 _ESCAPED = str.maketrans({"&": "+", "<": "(", ">": ")", '"': "\u201d", "'": "\u2019"})
 
@@ -153,4 +157,10 @@ def _text(transforms: list[Any], format_name: str) -> str:
     import PyOpenColorIO as ocio
 
     group = ocio.GroupTransform(transforms)
-    return str(group.write(formatName=format_name, config=ocio.Config.CreateRaw()))
+    text = str(group.write(formatName=format_name, config=ocio.Config.CreateRaw()))
+    return _NUMBERS.sub(_rounded, text)
+
+
+def _rounded(numbers: re.Match[str]) -> str:
+    """Return numbers without the last digits, which are only rounding of binary floats."""
+    return " ".join(f"{float(one):.9g}" for one in numbers[0].split())

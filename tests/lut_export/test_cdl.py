@@ -12,7 +12,7 @@ import PyOpenColorIO as ocio
 import pytest
 from numpy.typing import NDArray
 from palette4d.lut_export.bake import bake
-from palette4d.lut_export.cdl import Cdl, fit
+from palette4d.lut_export.cdl import Cdl, collection, fit
 from palette4d.lut_export.frame_edit import frame_edit
 
 from palette4d import Palette4dError, _core
@@ -143,3 +143,10 @@ def test_max_error_refuses_and_writes_nothing(warm_sidecar: Path, tmp_path: Path
     with pytest.raises(Palette4dError, match=r"stays above the limit.*ColorCorrection"):
         bake(warm_sidecar, 4.0, tmp_path / "a.cc", max_error=1e-4)
     assert [path.name for path in tmp_path.iterdir()] == ["cube.p4d.json"]
+
+
+def test_numbers_have_no_digits_of_rounding() -> None:
+    cdl = Cdl((0.708397, 1.1, 0.9), (-0.00001, 0.0, 0.1), (1.23456, 1.0, 1.0), 0.3)
+    root = ElementTree.fromstring(collection({"a > b": cdl, "c": cdl}))
+    texts = [one.text for one in root.iter() if one.text and one.text.strip()]
+    assert texts == ["0.708397 1.1 0.9", "-1e-05 0 0.1", "1.23456 1 1", "0.3"] * 2
