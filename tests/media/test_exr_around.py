@@ -8,6 +8,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import OpenImageIO as oiio
 import pytest
 from clip_files import write_image
@@ -19,7 +20,6 @@ from palette4d.grade.document import Document
 from palette4d.media import exr_around, exr_copy
 from palette4d.media.clip import open_clip
 
-OpenEXR = pytest.importorskip("OpenEXR")
 EDITED = Document.load(
     Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_edited.p4d.json"
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import OpenEXR
 import pytest
 from clip_files import write_image
 from deliveries import PLAIN, movie, render, tiles
@@ -14,8 +15,6 @@ from palette4d.grade.document import Document
 from palette4d.media.clip import ClipError, open_clip
 from palette4d.media.reading import read_as
 from palette4d.media.source_clip import find_clip
-
-OpenEXR = pytest.importorskip("OpenEXR")
 
 
 def layers(path):

@@ -370,7 +370,7 @@ def _part(source: Any, path: Path, reading: Reading) -> tuple[Any, list[int] | N
     if asked:
         source.close()
         wanted = " and ".join(
-            f"the {name} {value!r}"
+            f"{name} {value!r}"
             for name, value in (("layer", reading.layer), ("view", reading.view))
             if value is not None
         )
