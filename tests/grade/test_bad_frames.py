@@ -9,12 +9,13 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from clip_files import write_image, write_movie
+from clip_files import TimeCode, write_image, write_movie
 
 from palette4d.cli import main
 from palette4d.common.errors import Palette4dError
 from palette4d.grade.rendering import render
 from palette4d.media.clip import open_clip
+from palette4d.media.timecode import TIMECODE, start_timecode
 
 PLAIN = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_edited.p4d.json"
 
@@ -30,6 +31,26 @@ def sequence(folder: Path, frames, broken=()) -> str:
     for frame in broken:
         (folder / f"g.{frame:04d}.png").write_bytes(b"no picture")
     return str(folder / "g.####.png")
+
+
+def timed(folder: Path, frames, extension: str, further: bool = False) -> str:
+    """Frames of which frame 1 has the timecode 00:00:00:21."""
+    for frame in frames:
+        pixels = np.full((16, 24, 4 if further else 3), 0.1 * frame, np.float32)
+        if extension == "dpx":
+            pixels = (pixels * 65535).astype(np.uint16)
+        at = 20 + frame
+        code = at // 24 << 8 | at % 24 // 10 << 4 | at % 24 % 10
+        names = {"names": ("R", "G", "B", "Z")} if further else {}
+        path = folder / f"g.{frame}.{extension}"
+        write_image(path, pixels, smpte__TimeCode=TimeCode(code), **names)
+    return str(folder / f"g.#.{extension}")
+
+
+def word(path: Path, frame: int) -> int:
+    """The timecode of a file, its 32 bits."""
+    (found,) = (v for n, _, v in open_clip(str(path)).load(frame).metadata if n == TIMECODE)
+    return found[0]
 
 
 def levels(path: str | Path) -> dict[int, int]:
@@ -80,19 +101,34 @@ class TestFrames:
         with pytest.raises(Palette4dError, match="none readable"):
             render(PLAIN, clip, tmp_path / "o.####.png")
 
-    def test_a_timecode_is_not_held(self, tmp_path: Path) -> None:
-        from clip_files import TimeCode
+    @pytest.mark.parametrize("missing", ["hold", "black"])
+    @pytest.mark.parametrize("extension", ["exr", "dpx"])
+    def test_a_held_frame_has_its_own_timecode(
+        self, tmp_path: Path, extension: str, missing: str
+    ) -> None:
+        clip = timed(tmp_path / "in", [1, 2, 4], extension)
+        render(PLAIN, clip, tmp_path / f"o.#.{extension}", missing=missing, **NONE)
+        assert [word(tmp_path / f"o.{i}.{extension}", i) for i in (2, 3, 4)] == [0x22, 0x23, 0x100]
 
-        for frame in (1, 2):
-            image = grey(frame * 10).astype(np.uint16) * 257
-            write_image(tmp_path / f"g.{frame}.dpx", image, smpte__TimeCode=TimeCode(frame))
-        (tmp_path / "g.2.dpx").write_bytes(b"")
-        render(PLAIN, str(tmp_path / "g.#.dpx"), tmp_path / "o.#.exr", **NONE)
-        names = [
-            {name for name, _, _ in open_clip(str(tmp_path / f"o.{i}.exr")).load(i).metadata}
-            for i in (1, 2)
-        ]
-        assert "smpte:TimeCode" in names[0] - names[1]
+    def test_a_held_frame_of_further_channels_has_its_own_timecode(self, tmp_path: Path) -> None:
+        clip = timed(tmp_path / "in", [1, 2, 4], "exr", further=True)
+        render(PLAIN, clip, tmp_path / "o.#.exr", **NONE)
+        assert [word(tmp_path / f"o.{i}.exr", i) for i in (2, 3, 4)] == [0x22, 0x23, 0x100]
+
+    @pytest.mark.parametrize(
+        ("frames", "shown"),
+        [("3", {3: 20}), ("3-4", {3: 20, 4: 40}), ("3-5x2", {3: 20, 5: 50}), ("6", {6: 50})],
+    )
+    def test_each_chunk_holds_the_same(self, tmp_path: Path, frames: str, shown) -> None:
+        clip = sequence(tmp_path / "in", [1, 2, 4, 5, 7], broken=[6])
+        done = render(PLAIN, clip, tmp_path / "o.####.png", frames=frames, **NONE)
+        assert levels(tmp_path / "o.####.png") == shown
+        assert set(done.skipped) <= set(shown)
+
+    def test_the_first_of_a_chunk_of_a_movie(self, tmp_path: Path) -> None:
+        clip = timed(tmp_path / "in", [1, 2, 4, 5], "dpx")
+        render(PLAIN, clip, tmp_path / "o.mov", frames="3-5", **NONE)
+        assert start_timecode(open_clip(str(tmp_path / "o.mov"))) == "00:00:00:23"
 
 
 class TestMovies:

@@ -105,7 +105,7 @@ def _stated(clip: Clip, rate: Fraction) -> Stated:
     Floats have room above white and below black, as Y'CbCr has; highlights of scene-linear clips
     are so far out of it that they would lose their hue.
     """
-    start = start_timecode(clip) or ""
+    start = start_timecode(clip, rate) or ""
     if start and clip.is_movie:
         start = moved(start, clip.frames[0], rate)
     display = clip.depth in FLOATS and "linear" not in clip.encoding

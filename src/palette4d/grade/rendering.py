@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Generator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal
 
@@ -23,7 +24,7 @@ from palette4d.media.clip_base import F32, ClipError, FrameError, describe, name
 from palette4d.media.clip_images import ImageClip
 from palette4d.media.codecs import is_movie
 from palette4d.media.exr_copy import write_around
-from palette4d.media.frame_tags import frame_notes, of_colours, of_movie
+from palette4d.media.frame_tags import frame_notes, of_another_frame, of_colours, of_movie
 from palette4d.media.frame_writer import (
     FramePattern,
     OutputError,
@@ -32,14 +33,13 @@ from palette4d.media.frame_writer import (
     write_frame,
 )
 from palette4d.media.reading import like_source
+from palette4d.media.timecode import timecode_in
 
 Compare = Literal["wipe", "side"]
 #: Pixels above which frames are not read while others are written, between 5K and 6K: of 8K each
 #: needs 400 MB.
 LARGE = 16_000_000
 Missing = Literal["hold", "black", "error"]
-#: Metadata of a frame that are not those of a frame that it stands for.
-_OF_ONE_FRAME = ("smpte:TimeCode", "smpte:KeyCode")
 _LINE = np.float32(1.0)  # the line of a wipe, in code values: white
 
 
@@ -147,12 +147,11 @@ class Painter:
         painted = self._painted(frame)
         if painted is not None or self.missing == "leave out":
             return painted
-        before = self._nearest(frame)
+        image, pixels = self._nearest(frame)
         self.filled.append(frame)
-        image, pixels = before
         if self.missing == "black":
             pixels = np.zeros_like(pixels)
-        metadata = tuple(one for one in image.metadata if one[0] not in _OF_ONE_FRAME)
+        metadata = of_another_frame(image.metadata, frame - image.frame, self._rate)
         return replace(image, frame=frame, metadata=metadata), pixels
 
     def _painted(self, frame: int) -> tuple[Image, F32] | None:
@@ -198,15 +197,23 @@ class Painter:
         )
 
     @property
+    def _rate(self) -> Fraction:
+        """Frames per second; image files rarely state them, so that the sidecar's count."""
+        if self.clip.is_movie:
+            return self.clip.rate
+        return Fraction(*self.document.grade.core.clip["rate"])
+
+    @property
     def large(self) -> bool:
         """Whether memory holds one frame alone: not the next one, nor the one before."""
         return self.clip.width * self.clip.height > LARGE
 
     def _nearest(self, frame: int) -> tuple[Image, F32]:
-        """Return the nearest good frame before another one; the first good one if there is none."""
-        frames = self.clip.frames
-        at = frames.index(frame)
-        for other in (*reversed(frames[:at]), *frames[at + 1 :]):
+        """Return the nearest good frame before another one; the first good one if there is none.
+
+        It may lie outside the range that is rendered, so that each chunk shows the same.
+        """
+        for other in self.clip.nearest_to(frame):
             if self._last is not None and self._last[0].frame == other:
                 return self._last
             if (found := self._painted(other)) is not None:
@@ -458,7 +465,9 @@ def frame_files(clip: Clip, pattern: FramePattern, samples: str) -> Generator[_W
             metadata += tuple(one for one in of_colours(clip) if one[0] not in kept)
         path = pattern.path(image.frame)
         if image.around is not None and isinstance(clip, ImageClip) and clip.whole:
-            write_around(path, image.around, pixels, samples)
+            held = image.around.file != clip.file(image.frame)
+            own = timecode_in(metadata) if held else None
+            write_around(path, image.around, pixels, samples, own)
             return path
         premultiplied = clip.premultiplied
         write_frame(path, pixels, samples, premultiplied=premultiplied, metadata=metadata)

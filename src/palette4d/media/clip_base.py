@@ -151,6 +151,16 @@ class Clip(abc.ABC):
         """The frames before the first and behind the last file, which `skip_bad_frames` allows."""
         return []
 
+    @property
+    def all_frames(self) -> Sequence[int]:
+        """The frames that the files hold, also those outside the range that was opened."""
+        return self.frames
+
+    def nearest_to(self, frame: int) -> list[int]:
+        """Return the files' other frames: those before a frame, backwards, then those behind it."""
+        before = [other for other in self.all_frames if other < frame]
+        return before[::-1] + [other for other in self.all_frames if other > frame]
+
     @abc.abstractmethod
     def load(self, frame: int) -> Image:
         """Read one frame with its metadata; FrameError when it is missing or unreadable."""
@@ -230,8 +240,8 @@ class Clip(abc.ABC):
         return colours
 
     def skip(self, frame: int) -> None:
-        """List a bad frame in `skipped`."""
-        if frame not in self.skipped:
+        """List a bad frame in `skipped`, if it is one of `frames`."""
+        if frame in self.frames and frame not in self.skipped:
             self.skipped.append(frame)
             self.skipped.sort()
 

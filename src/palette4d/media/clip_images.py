@@ -81,6 +81,11 @@ class ImageClip(Clip):
         return self.sequence.path(frame)
 
     @property
+    def all_frames(self) -> Sequence[int]:
+        """The numbers of the sequence's files."""
+        return self.sequence.numbers
+
+    @property
     def outside(self) -> list[int]:
         """The frames before the first and behind the last file."""
         first, last = min(self.sequence.files), max(self.sequence.files)
@@ -185,13 +190,17 @@ def open_images(
     reading: Reading | None = None,
 ) -> ImageClip:
     """Open a sequence over the given range; raises ClipError or FrameError as `open_clip`."""
-    wanted = _wanted_frames(sequence, frames, embedded)
+    wanted = _wanted_frames(sequence, frames, embedded, gaps=skip_bad_frames)
     missing = [frame for frame in wanted if frame not in sequence.files]
     if missing and not skip_bad_frames:
         raise _missing(sequence, missing)
     source = str(next(iter(sequence.files.values()))) if single else sequence.pattern
     header: Header | None = None
-    for frame in wanted:
+    # A chunk of a render may hold bad frames alone: the frame before it in the clip is shown.
+    others = sorted(
+        set(sequence.files) - set(wanted), key=lambda one: (one > wanted[0], abs(one - wanted[0]))
+    )
+    for frame in [*wanted, *(others if skip_bad_frames else ())]:
         if frame in missing:
             continue
         try:
@@ -237,15 +246,18 @@ def _stated(header: Header) -> Stated:
     )
 
 
-def _wanted_frames(sequence: ImageSequence, frames: str | None, embedded: str | None) -> list[int]:
+def _wanted_frames(
+    sequence: ImageSequence, frames: str | None, embedded: str | None, *, gaps: bool
+) -> list[int]:
+    """Return the frames asked for; with `gaps` they may all lie between the files."""
     found = sequence.numbers
     if embedded is not None:
-        inside = parse_frames(embedded)
+        whole = parse_frames(embedded)
         if frames is None:
-            wanted = inside
+            wanted = whole
         else:
             wanted = parse_frames(frames)
-            if outside := sorted(set(wanted) - set(inside)):
+            if outside := sorted(set(wanted) - set(whole)):
                 raise ClipError(
                     f"{sequence.pattern}: {Arg('frames', frames)} includes {describe(outside)}, "
                     f"which the pattern's own range {embedded} leaves out. Give one of the two."
@@ -262,7 +274,8 @@ def _wanted_frames(sequence: ImageSequence, frames: str | None, embedded: str | 
                 f"Number the files, or choose a range with {Arg('frames')}."
             )
         return list(range(found[0], found[-1] + 1, step))
-    if not set(wanted) & set(found):
+    inside = any(found[0] < frame < found[-1] for frame in wanted)
+    if not set(wanted) & set(found) and not (gaps and inside):
         raise ClipError(
             f"{sequence.pattern}: found no {named(wanted)}, the clip has "
             f"{describe(found)}. Choose a range inside the clip."

@@ -87,6 +87,11 @@ class MovieClip(Clip):
         """Return the movie file, which holds every frame."""
         return self.path
 
+    @property
+    def all_frames(self) -> Sequence[int]:
+        """The frames of the file that can be looked for."""
+        return range(len(self.stamps) if self.stamps else self.count)
+
     def time(self, frame: int) -> Fraction:
         """Return the time at which a frame is shown, in seconds of the file."""
         return Fraction(self.stamps[frame] * self.time_base) if self.stamps else frame / self.rate

@@ -6,6 +6,7 @@ every type of channel and attribute.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,13 @@ from palette4d.media.frame_writer import cannot_write, quantised
 _LOSSLESS = (0, 1, 2, 3, 4)
 
 
-def write_around(path: Path, around: Around, pixels: NDArray[np.float32], samples: str) -> None:
+def write_around(
+    path: Path,
+    around: Around,
+    pixels: NDArray[np.float32],
+    samples: str,
+    timecode: str | None = None,
+) -> None:
     """Write a copy of an EXR whose picture is replaced, under a temporary name, and rename it.
 
     Parameters
@@ -30,6 +37,7 @@ def write_around(path: Path, around: Around, pixels: NDArray[np.float32], sample
     around : the file and the place of the picture in it.
     pixels : (h, w, 3 or 4) float32, premultiplied; of the picture's whole data window.
     samples : "half" or "float", for the picture's channels; others keep their types.
+    timecode : of the frame, `HH:MM:SS:FF`; by default that of the file.
 
     Raises
     ------
@@ -51,6 +59,8 @@ def write_around(path: Path, around: Around, pixels: NDArray[np.float32], sample
         channels[name].pixels = np.ascontiguousarray(planes[..., index])
     for part in file.parts:
         _lossless_rows(part.header)
+        if timecode is not None:
+            _set_timecode(part.header, timecode)
     with replacing(path, force=True) as temporary:
         try:
             file.write(str(temporary))
@@ -58,6 +68,16 @@ def write_around(path: Path, around: Around, pixels: NDArray[np.float32], sample
             raise cannot_write(path, str(error)) from error
         if not has_every_block(temporary):
             raise cannot_write(path, "")
+
+
+def _set_timecode(header: dict[str, Any], timecode: str) -> None:
+    """Set the timecode of a part that has one; "" removes it."""
+    if not timecode:
+        header.pop("timeCode", None)
+    elif found := header.get("timeCode"):
+        numbers = [int(part) for part in re.split("[:;.]", timecode)]
+        found.hours, found.minutes, found.seconds, found.frame = numbers
+        found.dropFrame = timecode[8] != ":"
 
 
 def _lossless_rows(header: dict[str, Any]) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 from palette4d.media.clip_base import Clip
 from palette4d.media.colour_tags import chromaticities, interop_name
-from palette4d.media.timecode import encoded, moved
+from palette4d.media.timecode import TIMECODE, decoded, encoded, moved
 
+#: Metadata of one frame alone; OpenImageIO states the timecode of a DPX twice.
+_OF_ONE_FRAME = (TIMECODE, "dpx:TimeCode", "smpte:KeyCode")
 Metadata = tuple[tuple[str, Any, Any], ...]
 
 
@@ -28,8 +31,19 @@ def of_movie(clip: Clip, frame: int) -> Metadata:
     if stated.timecode:
         word = encoded(moved(stated.timecode, frame, clip.rate))
         if word is not None:
-            found.append(("smpte:TimeCode", oiio.TypeTimeCode, (word, 0)))
+            found.append((TIMECODE, oiio.TypeTimeCode, (word, 0)))
     return tuple(found)
+
+
+def of_another_frame(metadata: Metadata, later: int, rate: Fraction) -> Metadata:
+    """Return the metadata for a frame so many frames later: with a timecode of its own."""
+    kept = tuple(one for one in metadata if one[0] not in _OF_ONE_FRAME)
+    for name, kind, value in metadata:
+        if name == TIMECODE:
+            word = encoded(moved(decoded(int(value[0])), later, rate))
+            if word is not None:
+                kept += ((name, kind, (word, *value[1:])),)
+    return kept
 
 
 def of_colours(clip: Clip) -> Metadata:

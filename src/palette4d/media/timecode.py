@@ -7,11 +7,15 @@ in each frame (SMPTE ST 268, `smpte:TimeCode`).
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from fractions import Fraction
+from typing import Any
 
 from palette4d.common.errors import Palette4dError
 from palette4d.media.clip_base import Clip
 
+#: OpenImageIO's name of the timecode that a frame states.
+TIMECODE = "smpte:TimeCode"
 _PARTS = re.compile(r"([0-9]{1,2})[:;.,]([0-9]{2})[:;.,]([0-9]{2})([:;.,])([0-9]{2,3})")
 
 
@@ -48,30 +52,37 @@ def frames_of(timecode: str, rate: Fraction, drop: bool = False) -> int | None:
     return count - skipped * (whole - whole // 10)
 
 
-def start_timecode(clip: Clip) -> str | None:
+def start_timecode(clip: Clip, rate: Fraction | None = None) -> str | None:
     """Return the timecode of a movie's frame 0, or of a sequence's first frame, `HH:MM:SS:FF`.
 
-    None if the files have none.
+    None if the files have none. If the first frame is bad, the nearest good one tells it; `rate` is
+    that of the sequence, by default the rate that the files state.
     """
     if clip.is_movie:
         return clip.stated.timecode or None
-    try:
-        return _of_image(clip)
-    except (Palette4dError, OSError):
-        return None
-
-
-def _of_image(clip: Clip) -> str | None:
-    for name, _, value in clip.load(clip.frames[0]).metadata:
-        if name == "smpte:TimeCode":
-            return _decoded(int(value[0]))
+    first = clip.frames[0]
+    for frame in (first, *clip.nearest_to(first)):
+        try:
+            metadata = clip.load(frame).metadata
+        except (Palette4dError, OSError):
+            continue
+        found = timecode_in(metadata)
+        if frame != first and found:
+            found = moved(found, first - frame, rate or clip.rate)
+        return found or None
     return None
 
 
-def _decoded(word: int) -> str:
+def timecode_in(metadata: Iterable[tuple[str, Any, Any]]) -> str:
+    """Return the timecode in a frame's metadata, or ""."""
+    words = (int(value[0]) for name, _, value in metadata if name == TIMECODE)
+    return next(map(decoded, words), "")
+
+
+def decoded(word: int) -> str:
     """Return the text of SMPTE ST 12's 32 bits: two decimal digits per byte, and flags.
 
-    >>> _decoded(0x10215203), _decoded(0x00000043)
+    >>> decoded(0x10215203), decoded(0x00000043)
     ('10:21:52:03', '00:00:00;03')
     """
     hours, minutes, seconds, frames = (word >> 24, word >> 16, word >> 8, word)
@@ -89,6 +100,8 @@ def encoded(timecode: str) -> int | None:
     >>> hex(encoded("10:21:52;03")), encoded("00:00:00:59")
     ('0x10215243', None)
     """
+    if not timecode:
+        return None
     numbers = [int(part) for part in timecode.replace(";", ":").replace(".", ":").split(":")]
     if numbers[3] > 39:
         return None
