@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from fractions import Fraction
 from pathlib import Path
 
@@ -178,28 +179,72 @@ class TestAgain:
     def run(self, *words: object) -> int:
         return main.main(["render", *map(str, words), "--strength", "0"])
 
-    def test_what_exists_stays(self, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    def test_what_is_whole_stays(self, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
         clip = sequence(tmp_path / "in", [1, 2, 4])
         out = tmp_path / "o.####.png"
-        assert self.run(PLAIN, clip, "-o", out, "--frames", "1-2", "--quiet") == 0
-        (tmp_path / "o.0001.png").write_bytes(b"mine")
+        assert self.run(PLAIN, clip, "-o", out, "--frames", "1-3", "--quiet") == 0
+        write_image(tmp_path / "o.0001.png", grey(99))
         (tmp_path / "o.0004.png").touch()  # a program that was killed left it
         capsys.readouterr()
         words = [PLAIN, clip, "-o", out, "--skip-existing", "--json", "--frames", "1-4"]
         assert self.run(*words) == 0
         found = json.loads(capsys.readouterr().out)
-        assert (found["frames"], found["kept"], found["filled"]) == ([3, 4], [1, 2], [3])
-        assert [Path(file).name for file in found["files"]] == ["o.0003.png", "o.0004.png"]
-        assert (tmp_path / "o.0001.png").read_bytes() == b"mine"
-        assert levels(tmp_path / "o.0003.png") == {3: 20}
-        assert self.run(*words) == 0
-        assert json.loads(capsys.readouterr().out)["frames"] == []
+        assert (found["frames"], found["kept"]) == ([4], [1, 2, 3])
+        assert (found["filled"], found["skipped"]) == ([], [])
+        assert [Path(file).name for file in found["files"]] == ["o.0004.png"]
+        assert levels(out) == {1: 99, 2: 20, 3: 20, 4: 40}
+        assert self.run(*words, "--skip-bad-frames") == 0
+        said = capsys.readouterr()
+        assert json.loads(said.out)["frames"] == []
+        assert "frame 3" not in said.err
 
-    def test_a_movie_that_exists_stays(self, tmp_path: Path) -> None:
-        (tmp_path / "o.mov").write_bytes(b"mine")
-        clip = sequence(tmp_path / "in", [1, 2])
-        assert self.run(PLAIN, clip, "-o", tmp_path / "o.mov", "--skip-existing") == 0
-        assert (tmp_path / "o.mov").read_bytes() == b"mine"
+    @pytest.mark.parametrize("extension", ["png", "exr", "tif", "dpx", "jpg"])
+    def test_damaged_and_older_frames_are_rendered_again(
+        self, tmp_path: Path, extension: str
+    ) -> None:
+        sidecar = tmp_path / "s.p4d.json"
+        sidecar.write_bytes(PLAIN.read_bytes())
+        clip = sequence(tmp_path / "in", [1, 2, 3, 4])
+        out = tmp_path / f"o.#.{extension}"
+        render(sidecar, clip, out, **NONE)
+        whole = (tmp_path / f"o.1.{extension}").read_bytes()
+        (tmp_path / f"o.1.{extension}").write_bytes(whole[:100])
+        (tmp_path / f"o.2.{extension}").write_bytes(whole[: len(whole) // 2])
+        write_image(tmp_path / "small.png", grey(1)[:8])
+        render(sidecar, str(tmp_path / "small.png"), tmp_path / f"o.3.{extension}", force=True)
+        done = render(sidecar, clip, out, skip_existing=True, **NONE)
+        assert (done.frames, done.kept) == ([1, 2, 3], [4])
+        assert any("3 damaged" in note for note in done.notes)
+        assert (tmp_path / f"o.1.{extension}").read_bytes()[:50] == whole[:50]
+        assert render(sidecar, clip, out, skip_existing=True, **NONE).frames == []
+        later = (tmp_path / f"o.2.{extension}").stat().st_mtime + 10
+        os.utime(sidecar, (later, later))
+        assert render(sidecar, clip, out, skip_existing=True, **NONE).frames == [1, 2, 3, 4]
+
+    def test_a_movie_stays_if_it_is_whole(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture
+    ) -> None:
+        sidecar, out = tmp_path / "s.p4d.json", tmp_path / "o.mov"
+        sidecar.write_bytes(PLAIN.read_bytes())
+        clip = sequence(tmp_path / "in", [1, 2, 3])
+        words = [sidecar, clip, "-o", out, "--skip-existing"]
+        assert self.run(*words) == 0
+        whole = out.read_bytes()
+        for damaged in (whole[:3000], whole[: len(whole) // 2], b"mine"):
+            out.write_bytes(damaged)
+            assert self.run(*words) == 0
+            assert levels(out)[2] == pytest.approx(30, abs=1)
+        status = out.stat().st_mtime_ns
+        capsys.readouterr()
+        assert self.run(*words) == 0
+        assert "movie kept" in capsys.readouterr().out
+        assert out.stat().st_mtime_ns == status
+        assert self.run(*words, "--frames", "1-2") == 0
+        assert count(out) == 2
+        later = out.stat().st_mtime + 10
+        os.utime(sidecar, (later, later))
+        assert self.run(*words, "--frames", "1-2") == 0
+        assert out.stat().st_mtime_ns != status
 
     @pytest.mark.parametrize(
         "words", [("--force", "--skip-existing"), ("--skip-bad-frames", "--missing", "error")]

@@ -196,7 +196,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--force", action="store_true", help="replace files that exist already")
     parser.add_argument(
-        "--skip-existing", action="store_true", help="keep frames that exist, render the others"
+        "--skip-existing",
+        action="store_true",
+        help="keep whole files that are not older than the sidecar",
     )
     parser.add_argument(
         "--missing",
@@ -229,6 +231,7 @@ def run(args: argparse.Namespace) -> int:
     from palette4d.cli.progress import frames_bar
     from palette4d.grade.document import Document
     from palette4d.media.clip_base import named
+    from palette4d.media.codecs import is_movie
     from palette4d.shows.frames import render
 
     if args.force and args.skip_existing:
@@ -278,7 +281,8 @@ def run(args: argparse.Namespace) -> int:
             to = "" if len(done.files) == 1 else f" to {last}"
             print(f"rendered {first}{to}, {counted(len(done.frames), 'frame')}")
         if done.kept:
-            print(f"kept {counted(len(done.kept), 'existing frame')}")
+            movie = is_movie(done.files[0]) if done.files else False
+            print("movie kept" if movie else f"kept {counted(len(done.kept), 'existing frame')}")
     if failed:
         raise failed
     return 0

@@ -18,6 +18,7 @@ from palette4d.common.message import Arg
 from palette4d.grade.document import Document
 from palette4d.grade.movie_rendering import MoviePlan
 from palette4d.grade.output import Output
+from palette4d.media import existing
 from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip import Clip, Image, open_clip
 from palette4d.media.clip_base import F32, ClipError, FrameError, describe, named, strips
@@ -280,7 +281,8 @@ def render(
         Write no files for such frames. A movie has no frame numbers, so that it follows
         ``missing``.
     skip_existing : bool
-        Keep files that exist, and render only the others: a render that was interrupted goes on.
+        Keep whole files that are not older than the sidecar, and render only the others: a render
+        that was interrupted goes on.
     force : bool
         Replace files that exist. A clip's own files are never replaced.
     progress : callable, optional
@@ -319,8 +321,13 @@ def render(
                 f"output {output}: {Arg('half', True)} and {Arg('bits')} are for frames, not for "
                 "movies"
             )
+        repeated = []
         if skip_existing and Path(output).exists():
-            return Rendered([Path(output)], [], [], [], kept=list(clip.frames))
+            older = existing.is_older(Path(output), document.path)
+            whole_movie = existing.is_whole_movie(Path(output), clip.frames)
+            if whole_movie and not older:
+                return Rendered([Path(output)], [], [], [], kept=list(clip.frames))
+            repeated = existing.again(not whole_movie, whole_movie)
         plan = MoviePlan.of(
             clip,
             document,
@@ -331,17 +338,25 @@ def render(
             crf=crf,
             sound=sound,
         )
-        check_targets([Path(output)], inputs, force)
+        check_targets([Path(output)], inputs, force or skip_existing)
         make_folder(Path(output).parent)
-        notes, opened = plan.notes, plan.opened()
+        notes, opened = [*repeated, *plan.notes], plan.opened()
     else:
         refuse_codec(output, codec, crf)
         pattern = FramePattern.parse(output, ", or a movie OUT.mp4 or OUT.mov")
         samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)
-        todo = frames_to_render(clip, pattern, inputs, skip_existing=skip_existing, force=force)
+        todo, repeated = frames_to_render(
+            clip,
+            pattern,
+            inputs,
+            (width, clip.height),
+            document.path,
+            skip_existing=skip_existing,
+            force=force,
+        )
         make_folder(pattern.folder)
         clip, left_out = with_surroundings(clip, pattern, drawn, compare)
-        notes = [*frame_notes(clip, pattern.extension), *left_out]
+        notes = [*repeated, *frame_notes(clip, pattern.extension), *left_out]
         opened = frame_files(clip, pattern, samples)
     warnings = mismatches(document, clip, whole)
     notes = [*clip.notes, *notes]
@@ -378,7 +393,7 @@ def render(
     return Rendered(
         written[:1] if movie else written,
         rendered,
-        list(clip.skipped),
+        sorted(set(clip.skipped) & set(todo)),
         [*warnings, *notes],
         sorted(set(clip.frames) - set(todo)),
         painter.filled,
@@ -435,18 +450,30 @@ def opened_for_render(
 
 
 def frames_to_render(
-    clip: Clip, pattern: FramePattern, inputs: set[Path], *, skip_existing: bool, force: bool
-) -> list[int]:
-    """Return the frames to write, after a check of their files."""
+    clip: Clip,
+    pattern: FramePattern,
+    inputs: set[Path],
+    size: tuple[int, int],
+    sidecar: Path | None,
+    *,
+    skip_existing: bool,
+    force: bool,
+) -> tuple[list[int], list[str]]:
+    """Return the frames to write, after a check of their files, and a note on those written again.
+
+    `size` is that of the pictures.
+    """
     targets = dict(zip(clip.frames, pattern.paths(clip.frames), strict=True))
-    if skip_existing:  # files are written under another name first: those that exist are whole
-        targets = {
-            frame: path
-            for frame, path in targets.items()
-            if not path.is_file() or not path.stat().st_size
-        }
+    damaged: set[int] = set()
+    older: set[int] = set()
+    if skip_existing:
+        there = {frame: path for frame, path in targets.items() if path.is_file()}
+        damaged = {f for f, path in there.items() if not existing.is_whole_frame(path, size)}
+        older = {f for f, path in there.items() if existing.is_older(path, sidecar)} - damaged
+        done = set(there) - damaged - older
+        targets = {frame: path for frame, path in targets.items() if frame not in done}
     check_targets(list(targets.values()), inputs, force or skip_existing)
-    return list(targets)
+    return list(targets), existing.again(len(damaged), len(older))
 
 
 _Write = Callable[[Image, F32], Path]

@@ -240,8 +240,8 @@ class Clip(abc.ABC):
         return colours
 
     def skip(self, frame: int) -> None:
-        """List a bad frame in `skipped`, if it is one of `frames`."""
-        if frame in self.frames and frame not in self.skipped:
+        """List a bad frame in `skipped`."""
+        if frame not in self.skipped:
             self.skipped.append(frame)
             self.skipped.sort()
 

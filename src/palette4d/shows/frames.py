@@ -135,13 +135,14 @@ def _on_farm(
     pattern = FramePattern.parse(str(output))
     samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)
     inputs = {clip.file(frame) for frame in clip.frames}
-    todo = rendering.frames_to_render(
-        clip, pattern, inputs, skip_existing=skip_existing, force=force
+    size = clip.width * (2 if compare == "side" else 1), clip.height
+    todo, repeated = rendering.frames_to_render(
+        clip, pattern, inputs, size, document.path, skip_existing=skip_existing, force=force
     )
     make_folder(pattern.folder)
     warnings = rendering.mismatches(document, clip, frames is None)
     _, left_out = rendering.with_surroundings(clip, pattern, Output(**picture), compare)
-    notes = [*clip.notes, *frame_notes(clip, pattern.extension), *left_out]
+    notes = [*clip.notes, *repeated, *frame_notes(clip, pattern.extension), *left_out]
     if tell is not None:
         for kind, texts in (("warning", warnings), ("note", notes)):
             for text in texts:
@@ -196,7 +197,6 @@ def render_frames(task: FramesTask, threads: int) -> Files:
     clip, _ = rendering.with_surroundings(clip, task.pattern, task.drawn, task.compare)
     painter = Painter(document, clip, task.drawn, task.compare, task.space, threads, task.missing)
     content = {}
-    skipped_before = set(clip.skipped)
     with tempfile.TemporaryDirectory(prefix="palette4d-") as folder:
         pattern = FramePattern(Path(folder), "", task.pattern.suffix, 1)
         with rendering.frame_files(clip, pattern, task.samples) as write:
@@ -205,7 +205,7 @@ def render_frames(task: FramesTask, threads: int) -> Files:
                     path = write(*painted)
                     content[frame] = path.read_bytes()
                     path.unlink()
-    bad = (set(clip.skipped) - skipped_before) | (set(clip.skipped) & set(task.frames))
+    bad = set(clip.skipped) & set(task.frames)
     return Files(content, tuple(sorted(bad)), tuple(painter.filled))
 
 
