@@ -256,6 +256,32 @@ def test_timecode_aspect_reel_and_sound_are_kept(tmp_path, rate):
     assert said(tmp_path / "o.mov").sound == 0
 
 
+@pytest.mark.parametrize("name", ["o.mov", "o.mp4"])
+def test_title_times_and_languages_are_kept(tmp_path, name):
+    made = movie(tmp_path / "made.mov", list(tiles(12)), sound="pcm_s16le")
+    source = tmp_path / "s.mov"
+    texts = {"title": "Reel 3", "comment": "night", "make": "Maker"}
+    texts["creation_time"] = "2024-05-06T07:08:09.000000Z"
+    with av.open(str(made)) as old, av.open(str(source), "w") as new:
+        new.metadata.update(texts)
+        copies = {one.index: new.add_stream_from_template(one) for one in old.streams}
+        for one, track in zip(copies.values(), ("Camera A", "Dialogue"), strict=True):
+            one.metadata.update(handler_name=track, language="fra")
+        for packet in old.demux():
+            if packet.size:
+                packet.stream = copies[packet.stream_index]
+                new.mux(packet)
+    done = render(source, tmp_path / name)
+    if name == "o.mp4":
+        del texts["make"]
+    assert any("metadata: make" in note for note in done.notes) == (name == "o.mp4")
+    with av.open(str(tmp_path / name)) as found:
+        assert {key: found.metadata.get(key) for key in texts} == texts
+        video, sound = found.streams.video[0].metadata, found.streams.audio[0].metadata
+    assert video["handler_name"] == "Camera A"
+    assert (sound["handler_name"], sound["language"]) == ("Dialogue", "fra")
+
+
 def test_compressed_sound_keeps_its_times(tmp_path):
     source = movie(tmp_path / "s.mp4", list(tiles(24)), sound="aac")
     render(source, tmp_path / "o.mp4")

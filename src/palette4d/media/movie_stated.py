@@ -16,6 +16,12 @@ from palette4d.media.colour_tags import ColourTags
 from palette4d.media.movie_pixels import FULL_RANGE, is_luma_chroma, turn
 from palette4d.media.stated import Fields, Stated
 
+# What is about the source's file, or is stated elsewhere.
+_OF_THE_FILE = re.compile(
+    ".*_brands?|minor_version|encoder|duration|timecode|reel_name|(.*_)?u(id|mid|l)|product_.*|"
+    "company_name|application_platform|toolkit_version|modification_date",
+    re.IGNORECASE,
+)
 _TIMECODE = re.compile(r"([0-9]{2}:[0-9]{2}:[0-9]{2}[:;.][0-9]{2,3})")
 # AVFieldOrder: unknown, progressive, then four of interlaced pictures.
 _PROGRESSIVE, _TOP_FIRST = 1, (2, 4)
@@ -44,6 +50,12 @@ def stated_by(container: Any, stream: Any, picture: av.VideoFrame) -> Stated:
         field_order=order if fields else 0,
         reel=_first(container, "reel_name"),
         timecode=timecode_of(container),
+        texts=tuple(
+            (str(name), str(text))
+            for name, text in container.metadata.items()
+            if not _OF_THE_FILE.fullmatch(name)
+        ),
+        handler=str(stream.metadata.get("handler_name", "")),
         hdr10=_hdr10(picture),
     )
 

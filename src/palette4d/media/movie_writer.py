@@ -32,6 +32,16 @@ from palette4d.media.stated import Stated
 #: FFmpeg's numbers: interlaced, top or bottom field first, in which order the lines are stored.
 _FIELD_ORDERS = {"tff": (2, 4), "bff": (3, 5)}
 
+#: The texts that FFmpeg writes into .mov and .mp4.
+_BOTH_HOLD = {"title", "artist", "album", "comment", "copyright", "creation_time", "date", "genre"}
+_BOTH_HOLD |= {"location"}
+_HELD = {
+    "mov": _BOTH_HOLD | {"make", "model"},
+    "mp4": _BOTH_HOLD
+    | {"album_artist", "composer", "description", "grouping", "keywords", "lyrics", "network"}
+    | {"show", "synopsis", "episode_id", "track"},
+}
+
 #: Rows of a picture that share chroma samples at most: two of each field.
 _ROWS = 4
 
@@ -107,9 +117,13 @@ class Delivery:
                 "the movie has no alpha, the picture is laid over black; frames and "
                 f"{Arg('codec', 'prores4444')} keep it"
             )
+        held = _HELD[path.suffix.lower().lstrip(".")]
+        if lost := [name for name, _ in stated.texts if name not in held]:
+            notes.append(f"the movie does not keep of the clip's metadata: {', '.join(lost)}")
+        texts = tuple(one for one in stated.texts if one[0] in held)
         return cls(
             chosen,
-            dataclasses.replace(stated, tags=tags),
+            dataclasses.replace(stated, tags=tags, texts=texts),
             alpha and bool(chosen.alpha_layout),
             crf,
             tuple(map(Message, notes)),
@@ -224,7 +238,9 @@ def _stream(movie: Any, size: tuple[int, int], rate: Fraction, how: Delivery) ->
         context.field_order = stated.field_order if stated.field_order in orders else orders[0]
     if how.codec.encoder == "libx265":
         context.codec_tag = "hvc1"  # which QuickTime needs
-    for name, text in (("timecode", stated.timecode), ("reel_name", stated.reel)):
+    movie.metadata.update(stated.texts)
+    own = {"timecode": stated.timecode, "reel_name": stated.reel, "handler_name": stated.handler}
+    for name, text in own.items():
         if text:
             stream.metadata[name] = text
     stream.thread_type = "AUTO"

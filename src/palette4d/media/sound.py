@@ -20,6 +20,9 @@ from palette4d.media.clip_movie import MovieClip, opened_movie
 
 _LAYOUTS = {1: "mono", 2: "stereo", 6: "5.1", 8: "7.1"}
 
+# What a track of sound states.
+_KEPT = ("language", "handler_name", "title")
+
 
 @dataclass(frozen=True)
 class Sound:
@@ -82,6 +85,9 @@ class Sound:
             chosen = [source.streams[index] for index in self.streams]
             extension = "mp4" if "mp4" in movie.format.name else "mov"
             targets = {one.index: _added(movie, one, extension) for one in chosen}
+            for one in chosen:
+                kept = {name: one.metadata[name] for name in _KEPT if name in one.metadata}
+                targets[one.index].metadata.update(kept)
             packets = source.demux(chosen) if chosen else iter(())
             encoded = {one.index for one in chosen if _encoded(one, extension)}
             yield Copier(self, targets, encoded, packets)

@@ -24,6 +24,8 @@ class Stated:
     field_order : FFmpeg's number for the order in which the file stores and shows fields.
     reel : name of the reel or the camera's roll, or "".
     timecode : `HH:MM:SS:FF` of frame 0 of a movie, or "".
+    texts : (name, text) of what else a movie states, such as its title and time of creation.
+    handler : name of a movie's video track, or "".
     hdr10 : mastering display and light levels, as the options of x265; "" if there are none.
     """
 
@@ -34,4 +36,6 @@ class Stated:
     field_order: int = 0
     reel: str = ""
     timecode: str = ""
+    texts: tuple[tuple[str, str], ...] = ()
+    handler: str = ""
     hdr10: str = ""
