@@ -29,7 +29,7 @@ pack() {
         cp -L "$loader" "$folder/lib/"
     done
     echo libnvidia-opencl.so.1 > "$folder/vendors/nvidia.icd"
-    "${PYTHON:-$root/.venv/bin/python}" "$root/tools/gpu_check_sidecars.py" "$folder/sidecars"
+    "${PYTHON:-$root/.venv/bin/python}" "$root/tests/parity/gpu_sidecars.py" "$folder/sidecars"
     du -sh "$folder"
 }
 
