@@ -128,6 +128,15 @@ def test_arrays_that_do_not_fit_are_refused(allowed, order):
         )  # fmt: skip
 
 
+def test_one_colour_may_link_to_three():
+    first, second = np.ones((1, 1), bool), np.ones((3, 3), bool)
+    links, broken, complete = _core.find_links(
+        np.ones((1, 3)), np.ones((1, 3), bool), first, second, [0],
+        strict=True, bound=9.0, broken_cost=1.0, most_nodes=9,
+    )  # fmt: skip
+    assert (sorted(map(tuple, links)), broken, complete) == ([(0, 0), (0, 1), (0, 2)], 0, True)
+
+
 def test_between_two_frames_the_mesh_meets_both_palettes():
     """With the rules obeyed, projecting the mesh to either side gives that side's triangles."""
     for seed in range(6):

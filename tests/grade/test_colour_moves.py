@@ -118,6 +118,20 @@ def test_a_track_gets_a_colour() -> None:
     assert edge.grade.colour("e4", frame=4.5) == pytest.approx((0.5, 0.5, 0.5))
 
 
+def test_what_is_beside_a_locked_handle_moves() -> None:
+    doc = document("split")
+    stop = doc.stop("e4", frame=4.5, rgb=(0.5, 0.4, 0.3))
+    locked = doc.grade.colour("v4")
+    doc.lock("v4")
+    assert set(doc.adjust("v8", track=True, by=(0.1, 0, 0))) >= {"v8", "v12", stop}
+    doc.adjust(by=(0.1, 0, 0))
+    doc.adjust("e4", track=True, frame=2, rgb=(0.6, 0.6, 0.6))  # gets a stop there
+    assert doc.grade.colour("v4") == locked
+    assert doc.grade.colour("e4", frame=2) == pytest.approx((0.6, 0.6, 0.6))
+    doc.adjust("v4", track=True, by=(0.1, 0, 0))  # named, it moves
+    assert doc.grade.colour("v4") == pytest.approx(np.add(locked, (0.1, 0, 0)))
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_the_palette_moves_as_a_whole(name: str) -> None:
     one, two = document(name), document(name)

@@ -163,6 +163,9 @@ def test_a_copy_that_transfers_next_to_nothing_does_not_fit() -> None:
     assert not Fit(change, change, 2 * change, 0).fits
     assert Fit(change, change / 4, change, 0).fits
     assert Fit(0, 1e-6, 1e-5, 0).fits  # nothing to transfer
+    large = 20 / 255
+    assert Fit(large, 0.25 * large, large, 0).fits
+    assert not Fit(large, 0.4 * large, large, 0).fits
 
 
 def test_a_new_analysis_with_another_palette_gets_the_grade(tmp_path: Path) -> None:

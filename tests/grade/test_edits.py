@@ -151,8 +151,8 @@ def test_old_steps_are_folded() -> None:
     for step in kept:
         found = step.apply(found)
     assert found == now
-    path = tuple(PathKey(frame, (0.25, 0.5, 0.75)) for frame in range(20))
-    picks = [Pick(f"p{i}", "hold", 1, (0, 0, 0), path=path) for i in range(1000)]
+    path = tuple(PathKey(frame, (0.25, 0.5, 0.75)) for frame in range(100))
+    picks = [Pick(f"p{i}", "hold", 1, (0, 0, 0), path=path) for i in range(300)]
     big: State = {("pick", pick.id): pick for pick in picks}
     kept = bounded([difference({}, {key: pick}) for key, pick in big.items()])
     assert len(json.dumps(written(*kept[1:])["history"])) < 300_000

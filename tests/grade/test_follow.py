@@ -149,3 +149,33 @@ def test_a_path_ends_on_a_thing_of_another_size(changed: str) -> None:
     there = np.interp(range(30), [key.frame for key in path], [key.there for key in path])
     assert there[0] == 1
     assert there[29] == (1 if changed == "light" else 0)
+
+
+def test_small_errors_do_not_add_up() -> None:
+    """Without its way home the colour would drift along the gradient, by the grain."""
+    still = np.full((8, 12, 3), (0.2, 0.5, 0.3))
+    still[..., 0] = np.linspace(0.1, 0.9, 12)
+    grain = 0.06 * np.random.default_rng(1).normal(size=(300, *still.shape))
+    clip = ArrayClip(np.clip(still + grain, 0, 1).astype(np.float32))
+    path = follow.paths(clip, [(0, (0.5, 0.5, 0.3))], (0, 299))
+    assert max(np.linalg.norm(np.subtract(key.rgb, (0.5, 0.5, 0.3))) for key in path) < 0.05
+
+
+def test_a_flash_of_another_colour_is_not_followed() -> None:
+    frames = np.empty((24, 40, 60, 3), np.float32)
+    frames[:] = [0.2, 0.3, 0.7]
+    frames[:, 10:30, 10:40] = [0.6, 0.3, 0.2]
+    frames[12:14, 10:30, 10:40] = [0.6, 0.6, 0.2]
+    path = follow.paths(ArrayClip(frames), [(2, (0.6, 0.3, 0.2))], (0, 23))
+    assert max(np.linalg.norm(np.subtract(key.rgb, (0.6, 0.3, 0.2))) for key in path) < 0.02
+
+
+def test_a_colour_that_comes_back_is_there_again() -> None:
+    picture = np.full((40, 60, 3), (0.5, 0.6, 0.7))
+    picture[10:16, 10:16] = (0.8, 0.15, 0.1)
+    light = np.clip(np.abs(np.linspace(-1.5, 1.5, 40)), 0, 1)[:, None, None, None]
+    grain = 0.01 * np.random.default_rng(3).normal(size=(40, *picture.shape))
+    clip = ArrayClip(np.clip(light * picture + grain, 0, 1).astype(np.float32))
+    path = follow.paths(clip, [(2, (0.8, 0.15, 0.1))], (0, 39))
+    there = np.interp([2, 20, 38], [key.frame for key in path], [key.there for key in path])
+    assert there.tolist() == [1, 0, 1]

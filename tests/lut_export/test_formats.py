@@ -134,6 +134,13 @@ def test_a_linear_shaper_for_a_little_more(
     assert result.error < 0.06
 
 
+def test_a_shaper_covers_the_palette_too(linear_sidecar: Path, tmp_path: Path) -> None:
+    """LUTs of a clip are alike, whatever each frame shows."""
+    image = np.full((2, 2, 3), 2.0, np.float32)
+    result = bake(linear_sidecar, 4.0, tmp_path / "all.clf", size=9, clip=image)
+    assert (result.shaper.low, result.shaper.high) == (-0.1, 50.0)
+
+
 def test_without_a_shaper_beyond_one_is_clamped(
     linear_sidecar: Path, bright_picture: F32, tmp_path: Path
 ) -> None:
