@@ -366,6 +366,21 @@ def test_frames_of_a_movie_state_what_it_states(tmp_path):
     assert (found.timecode, found.reel, found.aspect) == (first.timecode, "A001", Fraction(4, 3))
 
 
+@pytest.mark.parametrize("extension", ["exr", "dpx"])
+def test_frames_have_no_timecode_in_part_above_30_a_second(tmp_path, extension):
+    source = movie(
+        tmp_path / "s.mov",
+        list(tiles(4)),
+        rate=Fraction(50),
+        metadata={"timecode": "10:00:00:38"},
+    )
+    done = render(source, tmp_path / f"o.#.{extension}")
+    clip = open_clip(str(tmp_path / f"o.#.{extension}"))
+    for image in clip.iter_images():
+        assert "smpte:TimeCode" not in {name for name, _, _ in image.metadata}
+    assert len([note for note in done.notes if "timecode" in note]) == 1
+
+
 def test_alpha_survives_in_prores_4444(tmp_path):
     generator = np.random.default_rng(5)
     rgba = np.kron(generator.integers(9000, 56000, (8, 16, 4)), np.ones((16, 16, 1)))

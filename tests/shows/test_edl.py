@@ -257,6 +257,15 @@ def test_hostile_lines_take_no_time(line: str, tmp_path: Path) -> None:
     assert time.process_time() - begin < 5
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16", "utf-16-be"])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_a_copy_has_the_encoding_and_the_line_ends(encoding: str, end: str) -> None:
+    lines = ["TITLE: Schön", "", *event(FOUR, FOUR).splitlines()]
+    data = (end.join(lines) + end).encode(encoding)
+    assert edl_text.decoded(data).splitlines() == lines
+    assert edl_text.encoded_like(data, lines) == data
+
+
 def test_a_rate_of_decimals_is_the_ntsc_rate(tmp_path: Path) -> None:
     (clip,) = clips(HEAD + event(FOUR, FOUR), tmp_path, Fraction("23.976"))
     assert clip.rate == Fraction(24000, 1001)

@@ -57,13 +57,13 @@ def test_a_collection_and_an_edl(show: Path, tmp_path: Path) -> None:
         "--format",
         "ccc",
         "--ccc",
-        tmp_path / "show.ccc",
+        tmp_path / "cdls" / "show.ccc",  # in a folder that the export makes
         "--edl",
         tmp_path / "o.edl",
     ]
     assert main.main([*map(str, ["export", show, "-o", tmp_path / "cdls", *words]), "--quiet"]) == 0
     corrections = {}
-    for node in ElementTree.parse(tmp_path / "show.ccc").iter():
+    for node in ElementTree.parse(tmp_path / "cdls" / "show.ccc").iter():
         if node.tag.endswith("}ColorCorrection"):
             corrections[node.get("id")] = [
                 numbers(part.text)
@@ -73,7 +73,7 @@ def test_a_collection_and_an_edl(show: Path, tmp_path: Path) -> None:
     assert list(corrections) == ["one", "two"]
     assert corrections["two"] == [[1, 1, 1], [0, 0, 0], [1, 1, 1], [1]]
     assert corrections["one"] != corrections["two"]
-    text = (tmp_path / "o.edl").read_text("utf-8")
+    text = (tmp_path / "o.edl").read_bytes().decode("cp1252")
     assert "TITLE: Schön" in text
     assert "* COMMENT: stays" in text
     assert text.count("ASC_SOP") == text.count("ASC_SAT") == 2

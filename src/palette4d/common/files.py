@@ -29,8 +29,8 @@ _ACCESS_LIST = "system.posix_acl_access"
 _MOST_LINKS = 40
 
 
-def refuse_existing(path: Path, force: bool) -> None:
-    """Check that a file may be written to `path`."""
+def refuse_existing(path: Path, force: bool, made: Path | None = None) -> None:
+    """Check that a file may be written to `path`; the folder `made` need not exist yet."""
     if path.is_dir():
         raise Palette4dError(f"{path}: found a folder, expected a file name for the output")
     if path.exists() and not path.is_file():
@@ -38,6 +38,8 @@ def refuse_existing(path: Path, force: bool) -> None:
         raise Palette4dError(
             f"{path}: found a device or a pipe, expected a file name for the output"
         )
+    if made is not None and path.parent.absolute() == made.absolute() and not made.exists():
+        return
     if not path.parent.is_dir():
         raise Palette4dError(f"{path}: there is no folder {path.parent}; create it first")
     if path.exists() and not force:

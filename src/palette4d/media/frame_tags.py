@@ -7,7 +7,7 @@ from typing import Any
 
 from palette4d.media.clip_base import Clip
 from palette4d.media.colour_tags import chromaticities, interop_name
-from palette4d.media.timecode import TIMECODE, decoded, encoded, moved
+from palette4d.media.timecode import TIMECODE, decoded, encoded, moved, nominal
 
 #: Metadata of one frame alone; OpenImageIO states the timecode of a DPX twice.
 _OF_ONE_FRAME = (TIMECODE, "dpx:TimeCode", "smpte:KeyCode")
@@ -28,7 +28,7 @@ def of_movie(clip: Clip, frame: int) -> Metadata:
     ]
     if stated.reel:
         found.append(("reelName", "string", stated.reel))
-    if stated.timecode:
+    if stated.timecode and _counts(clip.rate):
         word = encoded(moved(stated.timecode, frame, clip.rate))
         if word is not None:
             found.append((TIMECODE, oiio.TypeTimeCode, (word, 0)))
@@ -39,11 +39,16 @@ def of_another_frame(metadata: Metadata, later: int, rate: Fraction) -> Metadata
     """Return the metadata for a frame so many frames later: with a timecode of its own."""
     kept = tuple(one for one in metadata if one[0] not in _OF_ONE_FRAME)
     for name, kind, value in metadata:
-        if name == TIMECODE:
+        if name == TIMECODE and _counts(rate):
             word = encoded(moved(decoded(int(value[0])), later, rate))
             if word is not None:
                 kept += ((name, kind, (word, *value[1:])),)
     return kept
+
+
+def _counts(rate: Fraction) -> bool:
+    """Whether a frame's 32 bits can count frames: above 30 a second they count pairs."""
+    return nominal(rate) <= 30
 
 
 def of_colours(clip: Clip) -> Metadata:
@@ -60,8 +65,13 @@ def of_colours(clip: Clip) -> Metadata:
 
 
 def frame_notes(clip: Clip, extension: str) -> list[str]:
-    """Return notes on what frames of this format cannot state of the clip's colours."""
+    """Return notes on what frames of this format cannot state of the clip."""
     tags, named = clip.stated.tags, clip.encoding
+    notes = []
+    if clip.stated.timecode and extension in ("exr", "dpx") and not _counts(clip.rate):
+        notes.append(
+            f"the frames have no timecode: {float(clip.rate):.6g} frames per second are above 30"
+        )
     fits = {
         # EXR names spaces; those of other EXR are carried over.
         "exr": bool(interop_name(tags)) or not clip.is_movie,
@@ -69,5 +79,8 @@ def frame_notes(clip: Clip, extension: str) -> list[str]:
         "dpx": named in ("sRGB", "Rec.709") or "linear" in named or not clip.is_movie,
     }.get(extension, named in ("sRGB", "Rec.709"))
     if named == "unknown" or fits:
-        return []
-    return [f"the frames cannot say that their colours are {named}: .{extension} has no such tag"]
+        return notes
+    return [
+        *notes,
+        f"the frames cannot say that their colours are {named}: .{extension} has no such tag",
+    ]

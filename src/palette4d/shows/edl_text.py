@@ -10,7 +10,7 @@ import codecs
 import dataclasses
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 from palette4d.common.errors import Arg, Palette4dError
@@ -63,16 +63,36 @@ class Event:
 
 def decoded(data: bytes) -> str:
     """Return the text of an EDL in UTF-8, UTF-16, Windows-1252 or Latin-1."""
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return data.decode("utf-16", "replace")
+    encoding, mark = _encoding_of(data)
+    return data[len(mark) :].decode(encoding, "replace")
+
+
+def encoded_like(data: bytes, lines: Sequence[str]) -> bytes:
+    """Return lines as a file in the encoding and with the line ends of another one's bytes."""
+    encoding, mark = _encoding_of(data)
+    first = next(iter(decoded(data).splitlines(keepends=True)), "")
+    end = first[len(first.rstrip("\r\n")) :] or "\n"
+    return mark + (end.join(lines) + end).encode(encoding, "replace")
+
+
+def _encoding_of(data: bytes) -> tuple[str, bytes]:
+    """Return the encoding of an EDL's bytes, and its byte order mark, or b""."""
+    for encoding, mark in (
+        ("utf-8", codecs.BOM_UTF8),
+        ("utf-16-le", codecs.BOM_UTF16_LE),
+        ("utf-16-be", codecs.BOM_UTF16_BE),
+    ):
+        if data.startswith(mark):
+            return encoding, mark
     if b"\0" in data[:200]:  # without a mark: an EDL begins with letters
-        return data.decode("utf-16-le" if data[1:2] == b"\0" else "utf-16-be", "replace")
-    for encoding in ("utf-8-sig", "cp1252"):
+        return "utf-16-le" if data[1:2] == b"\0" else "utf-16-be", b""
+    for encoding in ("utf-8", "cp1252"):
         try:
-            return data.decode(encoding)
+            data.decode(encoding)
         except UnicodeDecodeError:
             continue
-    return data.decode("latin-1")
+        return encoding, b""
+    return "latin-1", b""
 
 
 def title_of(text: str) -> str:

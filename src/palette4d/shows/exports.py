@@ -136,11 +136,11 @@ def export(
     if show:
         manifest = manifests.read(path)
         if otio is not None:
-            timeline = timeline_references.check(manifest, path, Path(otio), force)
+            timeline = timeline_references.check(manifest, path, Path(otio), force, folder)
         if ccc is not None:
-            show_cdls.check(Path(ccc), ".ccc", baked.format, force)
+            show_cdls.check(Path(ccc), ".ccc", baked.format, force, folder)
         if edl is not None:
-            show_cdls.check(Path(edl), ".edl", baked.format, force)
+            show_cdls.check(Path(edl), ".edl", baked.format, force, folder)
             edit = timeline_references.source_of(manifest, path, "edl")
             if not timeline_files.is_edl(edit):
                 raise Palette4dError(

@@ -20,8 +20,8 @@ from palette4d.shows.edl_cdl import Cdl
 from palette4d.shows.manifest import DONE, Manifest
 
 
-def check(target: Path, ending: str, format_name: str | None, force: bool) -> None:
-    """Refuse early what cannot be written."""
+def check(target: Path, ending: str, format_name: str | None, force: bool, made: Path) -> None:
+    """Refuse early what cannot be written; the export makes the folder `made`."""
     if target.suffix.lower() != ending:
         raise Palette4dError(f"{target}: expected the name of an {ending} file")
     if format_name not in ("cc", "ccc", "cdl"):
@@ -29,7 +29,7 @@ def check(target: Path, ending: str, format_name: str | None, force: bool) -> No
             f"{target}: found the format {format_name!r}, expected a CDL: format='ccc', 'cc' or "
             "'cdl'"
         )
-    refuse_existing(target, force)
+    refuse_existing(target, force, made)
 
 
 def of_shots(manifest: Manifest, exported: Mapping[str, Series]) -> dict[str, Cdl]:
@@ -64,7 +64,8 @@ def write_edl(
 ) -> list[str]:
     """Write a copy of an EDL with the shots' CDLs as comments; return notes for the user."""
     places = timeline_files.in_child(source, places_of, source, manifest.rate)
-    text = edl_text.decoded(read_regular(source, timeline_files.LARGEST_FILE))
+    data = read_regular(source, timeline_files.LARGEST_FILE)
+    text = edl_text.decoded(data)
     events = edl_text.events_of(text, manifest.rate)
     lines = text.splitlines()
     gone: set[int] = set()
@@ -85,7 +86,7 @@ def write_edl(
         out += [] if index in gone else [line]
         out += added.get(index + 1, ())
     with replacing(target, force=force) as temporary:
-        temporary.write_text("\n".join(out) + "\n", encoding="utf-8", newline="\n")
+        temporary.write_bytes(edl_text.encoded_like(data, out))
     names = list(dict.fromkeys(replaced))
     if not names:
         return []

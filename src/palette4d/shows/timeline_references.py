@@ -24,11 +24,14 @@ from palette4d.shows.manifest import DONE, Entry, Manifest
 NAMESPACE, VERSION = "palette4d", 1
 
 
-def check(manifest: Manifest, manifest_path: Path, target: Path, force: bool) -> Path:
-    """Return the timeline of a show, and refuse early what `write` would refuse."""
+def check(manifest: Manifest, manifest_path: Path, target: Path, force: bool, made: Path) -> Path:
+    """Return the timeline of a show, and refuse early what `write` would refuse.
+
+    The export makes the folder `made`.
+    """
     if target.suffix.lower() != ".otio":
         raise Palette4dError(f"{target}: expected the name of an .otio file")
-    refuse_existing(target, force)
+    refuse_existing(target, force, made)
     return source_of(manifest, manifest_path, "otio")
 
 
