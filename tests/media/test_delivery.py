@@ -143,6 +143,16 @@ def test_super_whites_and_sub_blacks_survive(tmp_path):
     np.testing.assert_allclose(samples(tmp_path / "back.mov")[0].astype(int), before, atol=5)
 
 
+@pytest.mark.parametrize(
+    ("layout", "codec", "fewer"),
+    [("yuv420p10le", "h264", True), ("yuv420p", "h264", False), ("yuv420p10le", "hevc", False)],
+)
+def test_fewer_bits_are_noted(tmp_path, layout, codec, fewer):
+    source = movie(tmp_path / "s.mp4", list(tiles()), "libx265", layout)
+    done = render(source, tmp_path / "o.mp4", codec=codec)
+    assert any("10 bits" in note for note in done.notes) == fewer
+
+
 def test_highlights_of_scene_linear_frames_keep_their_hue(tmp_path):
     pixels = np.full((128, 256, 3), (8.0, 0.2, 0.1), np.float32)
     write_image(tmp_path / "s.1.exr", pixels, oiio__ColorSpace="lin_rec709_scene")

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
+from palette4d.common.message import Arg, Message
 from palette4d.grade.document import Document
 from palette4d.media.clip import Clip, Image
 from palette4d.media.clip_base import F32
@@ -86,6 +87,14 @@ def movie_notes(clip: Clip, delivery: Delivery, size: tuple[int, int]) -> list[s
         found.append(
             f"the picture is {size[0]}x{size[1]} pixels, {delivery.codec.name} needs multiples "
             f"of {across}x{rows}; the last column or row is repeated"
+        )
+    bits = int(clip.depth[4:]) if clip.is_movie and clip.depth.startswith("uint") else 0
+    if bits > delivery.codec.bits == 8:
+        found.append(
+            Message(
+                f"the clip has {bits} bits a sample, {delivery.codec.name} has 8: smooth ramps may "
+                f"show bands; {Arg('codec', 'hevc')} keeps 10 bits"
+            )
         )
     if "linear" in clip.encoding:
         found.append(
