@@ -397,6 +397,22 @@ def test_undo_beside_another_writer(plain: Path) -> None:
     assert not found.grade.settings
 
 
+def test_a_change_that_was_taken_back_does_not_meet_theirs(plain: Path) -> None:
+    mine, theirs = Document.load(plain), Document.load(plain)
+    mine.set("v1", rgb=(1, 0, 0))
+    mine.reset("v1")
+    mine.set("v2", rgb=(0, 1, 0))
+    theirs.set("v1", rgb=(0, 0, 1))
+    theirs.save()
+    mine.save()
+    found = Document.load(plain)
+    assert found.grade.colour("v1") == (0, 0, 1)
+    found.undo()
+    assert set(found.grade.settings) == {"v1"}
+    found.undo()
+    assert not found.grade.settings
+
+
 def test_picks_are_undone_and_merged(plain: Path) -> None:
     first = plain.read_bytes()
     mine, theirs = Document.load(plain), Document.load(plain)
