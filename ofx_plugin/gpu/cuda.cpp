@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <mutex>
+#include <new>
 #include <utility>
 
 #include "gpu/kept.hpp"
@@ -111,7 +112,8 @@ struct Modules {
 /// Never destroyed: at the end of a process the driver may be gone. Modules are not unloaded: they
 /// go with their context, which may be gone too.
 Modules& modules() {
-    static auto* const all = new Modules;
+    alignas(Modules) static unsigned char place[sizeof(Modules)];
+    static auto* const all = new (place) Modules;
     return *all;
 }
 

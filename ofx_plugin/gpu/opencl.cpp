@@ -1,6 +1,7 @@
 // OpenCL 1.1, as hosts have it: their queue, and buffers in place of pixels.
 #include <cstdint>
 #include <mutex>
+#include <new>
 #include <utility>
 #include <vector>
 
@@ -110,7 +111,8 @@ struct Programs {
 };
 /// Never destroyed: at the end of a process the driver may be gone.
 Programs& programs() {
-    static auto* const all = new Programs;
+    alignas(Programs) static unsigned char place[sizeof(Programs)];
+    static auto* const all = new (place) Programs;
     return *all;
 }
 

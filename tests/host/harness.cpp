@@ -335,7 +335,7 @@ int stand_in(const std::vector<std::string>& words) {
 /// contain one of NAME (all without one), and none of -NAME; with odd or even every second of them.
 // What LeakSanitizer must not count: OpenCL on a processor keeps its compiler's memory.
 extern "C" const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() {
+extern "C" __attribute__((visibility("default"))) const char* __lsan_default_suppressions() {
     return "leak:libpocl\nleak:libLLVM\nleak:libOpenCL\n";
 }
 

@@ -67,6 +67,11 @@ std::string text_with_picks() {
 struct Both : Ready {
     Gpu& gpu;
     explicit Both(Gpu& on, const std::string& of = test::sidecar()) : Ready(of), gpu(on) {}
+    /// What is kept for a GPU goes with this action.
+    ~Both() {
+        instance.reset();
+        plugin.unload();
+    }
     std::vector<unsigned char> draw(const Picture* source, const Layout& layout,
                                     const OfxRectI& window, Gpu* on, double time = 3) {
         Picture output(layout);
@@ -264,6 +269,8 @@ TEST(gpu_two_contexts_and_sixteen_instances_at_once) {
         }
         for (std::thread& thread : threads) thread.join();
         CHECK(wrong == 0);
+        instances.clear();
+        plugin.unload();
     }
 }
 
