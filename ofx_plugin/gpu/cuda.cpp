@@ -24,7 +24,6 @@ using Handle = void*;
 using Pointer = std::uint64_t;
 
 constexpr int kMostShared = 8;  // CU_FUNC_ATTRIBUTE_MAX_DYNAMIC_SHARED_SIZE_BYTES
-constexpr std::size_t kPlainShared = 48 * 1024;
 constexpr unsigned kThreads = 128, kRows = 8;
 
 struct CudaFunctions {

@@ -26,11 +26,6 @@ void reach(const palette4d::LossFacet* facets, const int* which, int count,
     }
 }
 
-PALETTE4D_INLINE Lanes<double> height_above(const palette4d::LossFacet& f, const Lanes<double>& x,
-                                            const Lanes<double>& y, const Lanes<double>& z) {
-    return ((all(f.normal[0]) * x + all(f.normal[1]) * y) + all(f.normal[2]) * z) + all(f.offset);
-}
-
 void fall(const palette4d::LossFacet* facets, const int* which, int count,
           const double* const* channels, int size, double flat, palette4d::LossLeaf& leaf) {
     using Numbers = Lanes<double>;

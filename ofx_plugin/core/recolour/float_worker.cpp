@@ -26,8 +26,7 @@ void stay(const Plan<T>&, Block<T>& block, int, T, T, T*) {
 class Pipeline final : public RowWorker {
 public:
     Pipeline(const Recolourer& recolourer, const RecolourOptions& options, int channels)
-        : divide_(options.premultiplied),
-          channels_(channels),
+        : channels_(channels),
           kernels_(kernels_of<MvcKernels>(options.instructions)),
           one_by_one_(recolourer, options, channels),
           twofold_(recolourer.plan().twofold, kernels_.twofold,
@@ -165,9 +164,9 @@ private:
         /// Leaves colours that are too large for picks to the next stage.
         static void leave_large(Block<T>& block, int count) {
             const auto fits = [&](int i) {  // not NaN
-                return (std::abs(block.colour[0][i]) <= kLargestPicked) &
-                       (std::abs(block.colour[1][i]) <= kLargestPicked) &
-                       (std::abs(block.colour[2][i]) <= kLargestPicked);
+                return static_cast<int>(std::abs(block.colour[0][i]) <= kLargestPicked) &
+                       static_cast<int>(std::abs(block.colour[1][i]) <= kLargestPicked) &
+                       static_cast<int>(std::abs(block.colour[2][i]) <= kLargestPicked);
             };
             int fitting = 0;
             for (int i = 0; i < count; ++i) fitting += fits(i);
@@ -231,7 +230,6 @@ private:
         long long count_ = 0;
     };
 
-    const bool divide_;
     const int channels_;
     const MvcKernels& kernels_;
     DoubleWorker one_by_one_;
