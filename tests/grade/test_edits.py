@@ -119,7 +119,8 @@ def written(*done: Edit) -> dict[str, Any]:
     """The members of a sidecar with these steps, through JSON."""
     members = {"polytope": {"vertices": [{"id": "v1"}]}}
     found: dict[str, Any] = with_state(members, {}, (done, ()), {}, lambda: None)
-    return json.loads(json.dumps(found))  # type: ignore[no-any-return]
+    read: dict[str, Any] = json.loads(json.dumps(found))
+    return read
 
 
 def test_steps_are_the_same_after_their_json() -> None:

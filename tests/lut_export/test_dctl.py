@@ -73,11 +73,14 @@ class Compiled:
     """A DCTL file as C++."""
 
     def __init__(self, path: Path, *flags: str) -> None:
-        library = path.with_suffix(".so")
+        compiled, library = path.with_suffix(".o"), path.with_suffix(".so")
         source = Path(__file__).with_name("dctl_host.cpp")
         command = [compiler(), "-std=c++17", "-O1", *flags, "-Wall", "-Wno-unused-parameter"]
-        command += ["-Werror", "-shared", "-fPIC", f'-DPALETTE4D_DCTL="{path}"', str(source)]
-        subprocess.run([*command, "-o", str(library)], check=True, timeout=120)
+        command += ["-Werror", "-c", "-fPIC", f'-DPALETTE4D_DCTL="{path}"', str(source)]
+        subprocess.run([*command, "-o", str(compiled)], check=True, timeout=120)
+        # Linked without the flags: a library of -ffast-math switches off the process' subnormals.
+        link = [compiler(), "-shared", str(compiled), "-o", str(library)]
+        subprocess.run(link, check=True, timeout=120)
         self.library = ctypes.CDLL(str(library))
 
     def draw(self, frame: int, colours: F32, strength: float = 1.0, offset: int = 0) -> F32:

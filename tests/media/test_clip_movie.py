@@ -198,6 +198,18 @@ def test_a_jump_decodes_from_the_key_frame_before(tmp_path, monkeypatch):
     assert len(decoded) <= 1 + 8 + 1
 
 
+@pytest.mark.parametrize("width", [33, 259, 515])
+def test_a_picture_of_any_width_is_decoded_alike_each_time(tmp_path, width):
+    """Threads of libswscale wrote over each other's first pixels where 8 divides no row."""
+    random = np.random.default_rng(3).integers(0, 65535, (163, width, 3), np.uint16)
+    path = write_movie(
+        tmp_path / "a.mkv", "ffv1", "yuv422p10le", [random], "rgb48le", colorspace=Colorspace.ITU709
+    )
+    first = open_clip(str(path)).read(0)
+    for _ in range(12):
+        np.testing.assert_array_equal(open_clip(str(path)).read(0), first)
+
+
 def test_variable_rate_is_noted(tmp_path):
     stamps = [*range(30), 36, 37, *range(58, 88)]
     path = write_movie(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import threading
 from pathlib import Path
 
@@ -22,7 +23,7 @@ def test_of_calls_that_wait_only_the_newest_is_done() -> None:
     newest.ask(first)
     assert begun.wait(10)
     for number in (1, 2):
-        newest.ask(lambda number=number: done.append(number))  # type: ignore[misc]
+        newest.ask(functools.partial(done.append, number))
     newest.ask(lambda: (done.append(3), end.set()))
     go.set()
     assert end.wait(10)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import threading
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from pathlib import Path
 from queue import Queue
 
@@ -77,10 +77,10 @@ def test_only_the_newest_of_waiting_requests_is_shown_and_exact_work_stops_for_i
     monkeypatch.setattr(preview, "STRIP", 8 * WIDTH)
     make = made.make
 
-    def slow(request: Request, *, exact: bool, check: object = lambda: None) -> Picture:
+    def slow(request: Request, *, exact: bool, check: Callable[[], None] = lambda: None) -> Picture:
         begun.set()
         assert go.wait(30)
-        return make(request, exact=exact, check=check)  # type: ignore[arg-type]
+        return make(request, exact=exact, check=check)
 
     monkeypatch.setattr(made, "make", slow)
     made.ask(dataclasses.replace(request_, revision=1))

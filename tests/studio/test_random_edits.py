@@ -31,7 +31,7 @@ def test_random_edits_undone_are_the_first_bytes(tmp_path: Path, runs: int, step
     ids = [each["id"] for each in polytope["vertices"]]
     edges = [each["id"] for each in polytope["edges"]]
     handles = st.lists(st.sampled_from([*ids, "s1", "s2", "p1"]), max_size=3, unique=True)
-    colour = st.tuples(*[st.floats(-0.5, 1.5, width=32, allow_subnormal=False)] * 3)
+    colour = st.tuples(*[st.floats(-0.5, 1.5, width=32)] * 3)
 
     class Grading(RuleBasedStateMachine):
         """A person who edits, drags, undoes and redoes, while the session saves."""

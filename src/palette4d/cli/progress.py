@@ -27,17 +27,20 @@ def progress_bar(what: str, *, total: int | None, unit: str, hidden: bool) -> An
         file = unfiltered_stderr()
         return tqdm(total=total, desc=what, unit=unit, disable=hidden or None, file=file)
 
-    class Events(tqdm):  # type: ignore[misc]
-        told = 0.0
+    bar = tqdm(total=total, desc=what, file=io.StringIO())
+    told = 0.0
 
-        def display(self, msg: str | None = None, pos: int | None = None) -> None:
-            now = time.monotonic()
-            if msg != "" and (self.n == self.total or now - self.told > BETWEEN):
-                self.told = now
-                stage = job.shown(self.desc.rstrip(": ").replace("_", " "))
-                job.event(stage=stage, done=self.n, total=self.total)
+    def tell(msg: str | None = None, pos: int | None = None) -> None:
+        nonlocal told
+        now = time.monotonic()
+        if msg != "" and (bar.n == bar.total or now - told > BETWEEN):
+            told = now
+            stage = job.shown(bar.desc.rstrip(": ").replace("_", " "))
+            job.event(stage=stage, done=bar.n, total=bar.total)
 
-    return Events(total=total, desc=what, file=io.StringIO())
+    bar.display = tell
+    tell()
+    return bar
 
 
 @contextlib.contextmanager

@@ -108,8 +108,9 @@ def pick(
             f"found {'neither' if to is None else 'both'} of the new colour (to) and the "
             "change (by), expected one of them"
         )
+    given: dict[str, Any] = {**asked}
     names = ("toward", "whole_hue", "reach", "softness", "lightness")
-    shape: dict[str, Any] = {name: asked[name] for name in names if name in asked}  # type: ignore[literal-required]
+    shape = {name: given[name] for name in names if name in given}
     found = replace(at, kind="pick", to=new, **shape)
     return _add(grade, of_clip, found, asked, progress)
 

@@ -68,9 +68,10 @@ class Drawing(Matting, total=False):
 
 def recolour(grade: Grade, image: F32, frame: float, **how: Unpack[Drawing]) -> F32:
     """Recolour an image with the palette at a time (`Document.recolour`)."""
-    space = how.pop("space", "input")
-    premultiplied, threads = how.pop("premultiplied", False), how.pop("threads", 0)
-    output = Output(**how)  # type: ignore[misc]
+    drawing: dict[str, Any] = {**how}
+    space = drawing.pop("space", "input")
+    premultiplied, threads = drawing.pop("premultiplied", False), drawing.pop("threads", 0)
+    output = Output(**drawing)
     pixels = _checked_image(image)
     palette = grade.palette(frame)
     _conversion(grade, space)  # an error for a space that the sidecar lacks

@@ -120,6 +120,7 @@ class MovieClip(Clip):
             src_color_range=spread,
             dst_color_range=spread,
             interpolation="AREA",
+            threads=1,  # as `movie_pixels` has it
         )
         small.colorspace, small.color_range = matrix, spread
         return picture_pixels(small)

@@ -138,6 +138,8 @@ def _to(picture: av.VideoFrame, layout: str) -> av.VideoFrame:
     matrix = int(picture.colorspace) if int(picture.colorspace) in (1, 4, 5, 7, 9) else 5
     # Without a stated range libswscale assumes limited range for Y'CbCr, full range for R'G'B'.
     full = int(picture.color_range) == FULL_RANGE or picture.format.is_rgb
+    # One thread: where the width is no multiple of 8, each of several writes beyond its last row,
+    # over the first pixels of the next one's.
     return picture.reformat(
         format=layout,
         src_colorspace=matrix,
@@ -145,6 +147,7 @@ def _to(picture: av.VideoFrame, layout: str) -> av.VideoFrame:
         src_color_range=2 if full else 1,
         dst_color_range=2 if full or layout.startswith(("rgb", "gbr")) else 1,
         interpolation="BICUBIC",
+        threads=1,
     )
 
 

@@ -7,6 +7,7 @@ import itertools
 import math
 import re
 from collections.abc import Iterable
+from typing import Any
 
 _SOP = re.compile(r"\*?\s*ASC_SOP\s*:?\s*(.*)")
 _SAT = re.compile(r"\*?\s*ASC_SAT\s*:?\s*(.*)")
@@ -30,10 +31,10 @@ class Cdl:
         return {"asc_sat": self.saturation, "asc_sop": sop}
 
     @classmethod
-    def of_metadata(cls, found: object) -> Cdl | None:
+    def of_metadata(cls, found: Any) -> Cdl | None:
         """Return the CDL of `metadata`; None if it is none."""
         try:
-            sop, sat = found["asc_sop"], float(found["asc_sat"])  # type: ignore[index]
+            sop, sat = found["asc_sop"], float(found["asc_sat"])
             triples = [tuple(map(float, sop[name])) for name in ("slope", "offset", "power")]
         except (KeyError, TypeError, ValueError):
             return None
