@@ -138,8 +138,8 @@ def _to(picture: av.VideoFrame, layout: str) -> av.VideoFrame:
     matrix = int(picture.colorspace) if int(picture.colorspace) in (1, 4, 5, 7, 9) else 5
     # Without a stated range libswscale assumes limited range for Y'CbCr, full range for R'G'B'.
     full = int(picture.color_range) == FULL_RANGE or picture.format.is_rgb
-    # One thread: where the width is no multiple of 8, each of several writes beyond its last row,
-    # over the first pixels of the next one's.
+    # One thread: where a plane's width is no multiple of 8, each of several writes beyond its rows,
+    # over the first samples of the next one's.
     return picture.reformat(
         format=layout,
         src_colorspace=matrix,
