@@ -257,6 +257,24 @@ def test_hostile_lines_take_no_time(line: str, tmp_path: Path) -> None:
     assert time.process_time() - begin < 5
 
 
+@pytest.mark.parametrize("rate", [30, 60])
+def test_drop_frame_has_ntsc_rates_alone(rate: int, tmp_path: Path) -> None:
+    path = tmp_path / "cut.edl"
+    path.write_text(
+        "FCM: DROP FRAME\n" + event("00:10:00:00 00:10:01:00", "01:00:00:00 01:00:01:00")
+    )
+    edit = timeline_clips.clips_of(path, Fraction(rate))
+    assert edit.rate == Fraction(rate * 1000, 1001)
+    assert edit.clips[0].shown.frames(edit.rate) == (17982 * rate // 30, 18012 * rate // 30 - 1)
+    path.write_text("FCM: NON-DROP FRAME\n" + event(FOUR, FOUR))
+    assert timeline_clips.clips_of(path, Fraction(rate)).rate == rate
+
+
+def test_no_events(tmp_path: Path) -> None:
+    with pytest.raises(Palette4dError, match="found no events"):
+        clips("some words\nand more\n", tmp_path)
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16", "utf-16-be"])
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 def test_a_copy_has_the_encoding_and_the_line_ends(encoding: str, end: str) -> None:

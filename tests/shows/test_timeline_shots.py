@@ -204,12 +204,16 @@ class TestEdits:
         take = external("plates/b/take.mov")
         wild = otio.schema.LinearTimeWarp(time_scalar=math.nan)
         ramp = otio.schema.TimeEffect(effect_name="ramp")
+        curve = otio.schema.TimeEffect(name="curve")
         made = timeline(
-            clip("wild", take, 4, 5, effects=[wild]), clip("ramp", take, 4, 5, effects=[ramp])
+            clip("wild", take, 4, 5, effects=[wild]),
+            clip("ramp", take, 4, 5, effects=[ramp]),
+            clip("curve", take, 4, 5, effects=[curve]),
         )
-        wild_is, ramp_is = (shot.problem for shot in edit(made, tmp_path).shots)
+        wild_is, ramp_is, curve_is = (shot.problem for shot in edit(made, tmp_path).shots)
         assert "plays at nan times its speed" in wild_is
         assert "time effect 'ramp'" in ramp_is
+        assert "time effect 'curve'" in curve_is
 
     def test_nested_stacks_and_what_they_cut_away(self, tmp_path: Path, plates: Path) -> None:
         take = external("plates/b/take.mov")
@@ -409,8 +413,9 @@ class TestFiles:
             ("", "cannot be read as a timeline"),
             ("{", "cannot be read as a timeline"),
             ('{"OTIO_SCHEMA": "Timeline.1", "tracks": 3}', "cannot be read as a timeline"),
-            ('{"OTIO_SCHEMA": "Nonsense.1"}', "found a UnknownSchema"),
+            ('{"OTIO_SCHEMA": "Nonsense.1"}', "the type UnknownSchema"),
             ("[]", "expected a timeline"),
+            ('{"a": 1}', "found no OTIO_SCHEMA"),
         ],
     )
     def test_broken_files(self, text: str, words: str, tmp_path: Path) -> None:
@@ -435,7 +440,7 @@ class TestFiles:
                 edit(made, tmp_path)
         path = tmp_path / "empty.edl"
         path.write_text("TITLE: nothing\n")
-        with pytest.raises(Palette4dError, match="found 0 tracks"):
+        with pytest.raises(Palette4dError, match="found no events"):
             found_in(path)
 
     def test_a_collection(self, tmp_path: Path, plates: Path) -> None:

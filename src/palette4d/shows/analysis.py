@@ -141,6 +141,11 @@ def _of_edit(
         notes.append(
             f"an EDL does not state its rate: 24 frames per second are assumed ({Arg('rate')})"
         )
+    elif timeline_files.is_edl(path) and rate in (30, 60) and edit.rate != rate:
+        notes.append(
+            f"{path} drops frame numbers, which {rate} frames per second do not: "
+            f"{float(edit.rate):.4g} are assumed"
+        )
     if renamed:
         some = ", ".join(renamed[:8]) + (", …" if len(renamed) > 8 else "")
         notes.append(

@@ -102,6 +102,15 @@ def title_of(text: str) -> str:
     return found.removeprefix("TITLE:").strip()
 
 
+def states_drop(text: str) -> bool:
+    """Whether an EDL has a line FCM: DROP FRAME."""
+    return any(_drops(line) for line in text.splitlines() if line.strip().startswith("FCM:"))
+
+
+def _drops(line: str) -> bool:
+    return "NON" not in line.upper() and "DROP" in line.upper()
+
+
 def events_of(text: str, rate: Fraction) -> list[Event]:
     """Return the events in their order.
 
@@ -125,7 +134,7 @@ def _blocks(text: str, rate: Fraction) -> Iterator[tuple[list[EventLine], tuple[
     for index, raw in enumerate(text.splitlines(), start=1):
         line = raw[:LONGEST].strip()  # patterns take long for lines that no program writes
         if line.startswith("FCM:"):
-            drop = "NON" not in line.upper() and "DROP" in line.upper()
+            drop = _drops(line)
         elif line[:1].isdigit():
             event = _event_line(line, index, rate, drop)
             if block and (comments or int(event.number) != int(block[0].number)):

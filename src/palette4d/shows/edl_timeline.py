@@ -25,8 +25,11 @@ def timeline_of(path: Path, data: bytes, rate: Fraction | None, otio: Any) -> An
 
     `otio` is OpenTimelineIO. `Palette4dError` says which line is no event.
     """
-    known = None if rate is None else as_rate(float(rate))
-    return _made(path, data, known or DEFAULT_RATE, otio)[0]
+    known = (None if rate is None else as_rate(float(rate))) or DEFAULT_RATE
+    # Numbers drop at NTSC rates alone (SMPTE ST 12-1).
+    if known in (30, 60) and edl_text.states_drop(edl_text.decoded(data)):
+        known = Fraction(known * 1000, 1001)
+    return _made(path, data, known, otio)[0]
 
 
 def places_of(path: Path, data: bytes, rate: Fraction, otio: Any) -> dict[tuple[int, ...], int]:

@@ -165,8 +165,9 @@ def speed_of(clip: Any) -> float:
         elif isinstance(effect, schema.TimeEffect) and effect.effect_name == UNFOLLOWED:
             raise Palette4dError(f"the clip {clip.name!r}: {effect.name}")
         elif isinstance(effect, schema.TimeEffect):
+            name = effect.effect_name or effect.name or effect.schema_name()
             raise Palette4dError(
-                f"the clip {clip.name!r} has the time effect {effect.effect_name!r}, which is "
+                f"the clip {clip.name!r} has the time effect {name!r}, which is "
                 "not followed; expected a constant speed or a freeze frame"
             )
     if not math.isfinite(speed):

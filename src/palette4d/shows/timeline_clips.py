@@ -115,6 +115,8 @@ class _Walk:
             else:
                 self.walk((level,), (index,), track.name or f"V{index + 1}")
         notes = tuple(counted(count, *words) for words, count in self.others.items())
+        if not self.clips and not len(self.timeline.tracks) and timeline_files.is_edl(self.path):
+            raise Palette4dError(f"{self.path}: found no events; expected an EDL (CMX 3600)")
         if not self.clips:
             raise Palette4dError(
                 f"{self.path}: the timeline shows no clip: found "

@@ -107,9 +107,10 @@ def load(path: Path, rate: Fraction | None = None) -> Any:
             )
         found = timelines[0]
     if not isinstance(found, otio.schema.Timeline):
+        known = isinstance(found, otio.core.SerializableObject)
+        what = f"an object of the type {type(found).__name__}" if known else "no OTIO_SCHEMA"
         raise Palette4dError(
-            f"{path}: found a {type(found).__name__}, expected a timeline; write the edit to a "
-            "file as a whole"
+            f"{path}: found {what}, expected a timeline; write the edit to a file as a whole"
         )
     return found
 
