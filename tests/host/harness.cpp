@@ -91,6 +91,18 @@ std::string sidecar_text(bool edited) {
     return json.str();
 }
 
+std::string text_with_picks(bool edited) {
+    std::string text = sidecar_text(edited);
+    const std::string picks =
+        R"("picks": [{"id": "p1", "kind": "pick", "frame": 12, "rgb": [0.75, 0.25, 0.25],
+        "to": [0.25, 0.5, 0.75]},
+        {"id": "p3", "kind": "hold", "frame": 12, "rgb": [0.25, 0.75, 0.25]},
+        {"id": "p4", "kind": "pick", "frame": 12, "rgb": [0.25, 0.25, 0.75],
+        "to": [0.75, 0.75, 0.25]}], )";
+    text.insert(text.find("\"edits\": {") + 10, picks);
+    return text;
+}
+
 std::string sidecar(const std::string& name, bool edited) {
     return write(name, sidecar_text(edited));
 }

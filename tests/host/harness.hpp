@@ -60,6 +60,8 @@ std::string write(const std::string& name, const std::string& text);
 /// A sidecar of a box of eight colours over frames 10 to 20, which shrinks towards the end. With
 /// `edited`, some corners and a stop change; corners at blue 1 stay as they are.
 std::string sidecar_text(bool edited = true);
+/// The same with two picks, p1 and p4, and a hold, p3.
+std::string text_with_picks(bool edited = true);
 /// The same, written under a name; its path.
 std::string sidecar(const std::string& name = "clip.p4d.json", bool edited = true);
 

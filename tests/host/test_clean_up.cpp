@@ -13,19 +13,6 @@ using palette4d::Vec3;
 
 namespace {
 
-/// Two picks, p1 and p4, a hold, p3, and no other edit.
-std::string text_with_picks(bool moves = false) {
-    std::string text = sidecar_text(moves);
-    const std::string picks =
-        R"("picks": [{"id": "p1", "kind": "pick", "frame": 12, "rgb": [0.75, 0.25, 0.25],
-        "to": [0.25, 0.5, 0.75]},
-        {"id": "p3", "kind": "hold", "frame": 12, "rgb": [0.25, 0.75, 0.25]},
-        {"id": "p4", "kind": "pick", "frame": 12, "rgb": [0.25, 0.25, 0.75],
-        "to": [0.75, 0.75, 0.25]}], )";
-    text.insert(text.find("\"edits\": {") + 10, picks);
-    return text;
-}
-
 struct Picked : Ready {
     explicit Picked(bool moves = false)
         : Ready(test::write("picked.p4d.json", text_with_picks(moves))) {}

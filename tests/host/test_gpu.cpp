@@ -51,18 +51,6 @@ std::vector<Layout> gpu_layouts() {
     return all;
 }
 
-std::string text_with_picks() {
-    std::string text = sidecar_text();
-    const std::string picks =
-        R"("picks": [{"id": "p1", "kind": "pick", "frame": 12, "rgb": [0.75, 0.25, 0.25],
-        "to": [0.25, 0.5, 0.75]},
-        {"id": "p3", "kind": "hold", "frame": 12, "rgb": [0.25, 0.75, 0.25]},
-        {"id": "p4", "kind": "pick", "frame": 12, "rgb": [0.25, 0.25, 0.75],
-        "to": [0.75, 0.75, 0.25]}], )";
-    text.insert(text.find("\"edits\": {") + 10, picks);
-    return text;
-}
-
 /// A node that draws a picture here and on a GPU.
 struct Both : Ready {
     Gpu& gpu;
