@@ -15,7 +15,7 @@ from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import hex_of, percent
 from palette4d.grade import pick_edits
-from palette4d.grade.clip_of_picks import ClipOfPicks
+from palette4d.grade.clip_of_picks import ClipOfPicks, largest_part
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.grade import Grade
 from palette4d.grade.mattes import Display, display_curve
@@ -280,21 +280,10 @@ class _View:
 
     def place(self, mask: B) -> Place:
         """Return the middle of a mask's largest part, and a box that lies in it."""
-        from scipy import ndimage
-
-        labels, _ = ndimage.label(mask)
-        sizes = np.bincount(labels.ravel())
-        sizes[0] = 0
-        largest = labels == sizes.argmax()
-        depth = ndimage.distance_transform_cdt(np.pad(largest, 1))[1:-1, 1:-1]
-        row, column = np.unravel_index(int(depth.argmax()), depth.shape)
-        box = int(min(2 * depth.max() - 1, 15)) * self.every
-        pixel = (
-            int(column) * self.every + self.every // 2,
-            int(row) * self.every + self.every // 2,
-        )
+        largest, (column, row), box = largest_part(mask)
+        pixel = column * self.every + self.every // 2, row * self.every + self.every // 2
         rgb = as_colour(np.median(self.rgb[largest], axis=0).tolist())
-        return Place(pixel, max(box, 1), rgb, float(largest.mean()))
+        return Place(pixel, box * self.every, rgb, float(largest.mean()))
 
 
 def _shown(rgb: Colour, display: Display | None) -> Colour:

@@ -199,18 +199,12 @@ class ClipOfPicks:
         points = _core.pick_points(np.where(real[..., None], pixels, 0).reshape(-1, 3), display)
         away = np.abs(points - _core.pick_points([pick.rgb], display)) < SAME_COLOUR
         alike = away.all(axis=1).reshape(real.shape) & real
-        labels, count = ndimage.label(ndimage.binary_opening(alike))
-        if not count:
+        alike = ndimage.binary_opening(alike)
+        if not alike.any():
             return None
-        sizes = np.bincount(labels.ravel())
-        sizes[0] = 0
-        largest = labels == sizes.argmax()
+        largest, place, box = largest_part(alike)
         if largest.mean() < LEAST_REGION:
             return None
-        depth = ndimage.distance_transform_cdt(np.pad(largest, 1))[1:-1, 1:-1]
-        row, column = np.unravel_index(int(depth.argmax()), depth.shape)
-        box = int(min(2 * int(depth.max()) - 1, 15))
-        place = (int(column), int(row))
         rgb = self.colour(frame, place, box)
         return replace(pick, frame=frame, rgb=rgb, pixel=place, box=box)
 
@@ -289,3 +283,19 @@ def corrected(pick: Pick, frame: float, rgb: Colour) -> Pick:
     keys = {key.frame: key for key in pick.path if key.given and key.frame != pick.frame}
     keys[frame] = PathKey(frame, rgb, True)
     return replace(pick, path=tuple(keys[f] for f in sorted(keys)))
+
+
+def largest_part(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], tuple[int, int], int]:
+    """Return the largest connected part of a mask that is not empty, its middle, and a box there.
+
+    The middle is the pixel (x, y) farthest from the part's edge. The box has at most 15 pixels.
+    """
+    from scipy import ndimage
+
+    labels, _ = ndimage.label(mask)
+    sizes = np.bincount(labels.ravel())
+    sizes[0] = 0
+    largest = np.asarray(labels == sizes.argmax())
+    depth = ndimage.distance_transform_cdt(np.pad(largest, 1))[1:-1, 1:-1]
+    row, column = np.unravel_index(int(depth.argmax()), depth.shape)
+    return largest, (int(column), int(row)), int(min(2 * int(depth.max()) - 1, 15))

@@ -116,7 +116,10 @@ class _Walk:
                 self.walk((level,), (index,), track.name or f"V{index + 1}")
         notes = tuple(counted(count, *words) for words, count in self.others.items())
         if not self.clips and not len(self.timeline.tracks) and timeline_files.is_edl(self.path):
-            raise Palette4dError(f"{self.path}: found no events; expected an EDL (CMX 3600)")
+            raise Palette4dError(
+                f"{self.path}: the timeline shows no clip: found no events; "
+                "expected an EDL (CMX 3600) with at least one"
+            )
         if not self.clips:
             raise Palette4dError(
                 f"{self.path}: the timeline shows no clip: found "
