@@ -78,7 +78,7 @@ def _type(schema: Node, node: Node) -> str:
         of = _type(schema, item)
         return f"{count} × {of}" if count else f"list of {of}"
     names = {
-        "string": "id" if "pattern" in node else "text",
+        "string": "text" if "pattern" not in node or node.get("format") == "name" else "id",
         "object": "object",
         "boolean": "true or false",
     }

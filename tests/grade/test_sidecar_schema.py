@@ -54,6 +54,9 @@ def test_golden_files_fit_the_schema(path: Path) -> None:
     jsonschema.Draft202012Validator(SCHEMA).validate(found)
 
 
+GONE = object()
+
+
 def _members(value: Any, path: tuple[str | int, ...] = ()) -> list[tuple[str | int, ...]]:
     # Of a list the first element stands for all.
     items = value.items() if isinstance(value, dict) else list(enumerate(value))[:1]
@@ -69,7 +72,7 @@ def _members(value: Any, path: tuple[str | int, ...] = ()) -> list[tuple[str | i
 
 @pytest.mark.parametrize("name", ["v1_edited", "v2_picks"])
 def test_what_the_schema_refuses_the_reader_refuses(name: str) -> None:
-    """Each kind of value replaced in turn: what the reader takes fits the schema."""
+    """Each kind of value replaced or removed in turn: what the reader takes fits the schema."""
     validator = jsonschema.Draft202012Validator(SCHEMA)
     path = ROOT / "tests" / "golden" / "sidecars" / f"{name}.p4d.json"
     text = path.read_text(encoding="utf-8")
@@ -78,13 +81,32 @@ def test_what_the_schema_refuses_the_reader_refuses(name: str) -> None:
     if name == "v2_picks":
         places = [place for place in places if place[0] in ("edits", "mattes")]
     for place in places:
-        wrong: list[Any] = [None, True, "", "é", -1, 0.5, 1e7, 1e10, [], {}, [[]], ["v1"], {"a": 1}]
+        wrong: list[Any] = [
+            None,
+            True,
+            "",
+            "é",
+            -1,
+            0,
+            0.5,
+            1e7,
+            1e10,
+            [],
+            {},
+            [[]],
+            ["v1"],
+            {"a": 1},
+        ]
+        wrong += [[0, 0], [1, 1, 1, 1], "a b", "a" * 101, "a" * 140_000, [0.5, 0.5, 2], GONE]
         for value in wrong:
             document = json.loads(text)
             holder = document
             for step in place[:-1]:
                 holder = holder[step]
-            holder[place[-1]] = value
+            if value is GONE:
+                del holder[place[-1]]
+            else:
+                holder[place[-1]] = value
             try:
                 _core.parse_sidecar(json.dumps(document))
             except SidecarError:

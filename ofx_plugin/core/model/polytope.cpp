@@ -29,7 +29,7 @@ int find_index(const std::vector<int>& order, const Wanted& wanted, Key key) {
 
 Polytope::Polytope(std::vector<Vertex> vertices, std::vector<Edge> edges,
                    std::vector<Section> sections) {
-    validate_vertices_and_edges(vertices, edges);
+    validate_edges(vertices, edges);
     const auto parts = std::make_shared<Parts>();
     parts->edges_by_ends = sorted_indices(
         edges.size(), [&](int i) { return std::make_pair(edges[i].from, edges[i].to); });

@@ -1,5 +1,5 @@
 // The 4D skew polytope of section 4.1: vertices in RGB + time, inter-frame edges, and per-block
-// topology. Immutable once built; every constructor path goes through validation.
+// topology. Immutable once built; its constructor checks what must hold between its parts.
 #pragma once
 
 #include <array>
@@ -46,14 +46,6 @@ struct Section {
     bool transition;
     std::vector<std::vector<int>> tracks;
     std::vector<Face> faces;
-};
-
-/// What is wrong with a polytope, and where. `pointer` is relative to the polytope, as in the
-/// sidecar ("/blocks/1/faces/3", "/transitions/0/tracks/2", "/edges/5/from").
-struct PolytopeProblem {
-    std::string pointer;
-    std::string found;
-    std::string expected;
 };
 
 /// Copies share their parts.

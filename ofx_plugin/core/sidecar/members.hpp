@@ -1,4 +1,5 @@
-// The members of a sidecar, read from the JSON tree: one source each. All throw SidecarError.
+// The members of a sidecar, read from a JSON tree that fits the schema: one source each. All throw
+// SidecarError for what no schema can say.
 #pragma once
 
 #include <memory>
@@ -19,13 +20,14 @@ ColourConversion read_steps(const Cursor& steps, const std::string& file,
 
 /// An index that was looked up; refuses -1, an unknown id. `all`: "12 vertices".
 int known(const Cursor& where, int index, const char* kind, const std::string& all);
-/// Vertices, edges and stops share one set of ids, so an id alone identifies a handle.
-void claim(std::set<std::string>& taken, const Cursor& where, const std::string& id);
+/// Refuses an id or a name that is taken. Vertices, edges and stops share one set of ids, so an id
+/// alone identifies a handle.
+void claim(std::set<std::string>& taken, const Cursor& id);
 
 Polytope read_polytope(const Cursor& where, const ClipInfo& clip, const std::string& file);
 
 /// Mattes that `known` has with the same text are shared with it.
-PickMattes read_mattes(const Cursor& mattes, int version, const PickMattes& known);
+PickMattes read_mattes(const Cursor& mattes, const PickMattes& known);
 std::vector<Pick> read_picks(const Cursor& where, const PickMattes& mattes);
 
 Edits read_edits(const Cursor& where, const Polytope& polytope, const PickMattes& mattes);

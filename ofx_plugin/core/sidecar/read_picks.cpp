@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
@@ -12,103 +13,70 @@
 namespace palette4d {
 namespace {
 
-/// Each enabled pick costs time for each pixel, and a key of a path some.
-constexpr std::size_t kMaxPicks = 1000, kMaxPathKeys = 20'000;
+/// Each key of a path costs time for each frame.
+constexpr std::size_t kMaxPathKeys = 20'000;
 /// Points of strokes in all; of a stroke drawn by hand there are some hundreds.
 constexpr std::size_t kMaxPoints = 100'000;
-/// Learned mattes take some 15 KB each.
-constexpr std::size_t kMaxMatteText = 1 << 17;
-constexpr double kMaxReach = 8;
 
-void check_point(const Cursor& point) {
-    if (point.list("2 numbers, x and y") != 2) point.wrong("a list of 2 numbers, x and y");
-    for (std::size_t i = 0; i < 2; ++i) point.element(i).number(0.0, double{kMaxSize});
-}
+/// What the picks of a file have together.
+struct Counts {
+    std::set<std::string> ids;
+    std::size_t keys = 0, points = 0;
+};
 
-/// Where the matte is learned from: only the program that learns it reads this.
-void check_places(const Cursor& pick, std::size_t& points) {
-    if (pick.has("pixel")) check_point(pick.member("pixel"));
-    if (pick.has("box")) pick.member("box").integer(1, kMaxSize);
-    if (!pick.has("areas")) return;
-    const Cursor areas = pick.member("areas");
-    for (std::size_t i = 0, n = areas.list("areas"); i < n; ++i) {
-        const Cursor area = areas.element(i);
-        area.require_members({"frame", "points", "radius"});
-        area.member("frame").frame();
-        area.member("radius").number(0, double{kMaxSize});
-        const Cursor listed = area.member("points");
-        const std::size_t count = listed.list("points of areas in all", kMaxPoints, points);
-        if (count == 0) listed.wrong("at least one point");
-        points += count;
-        for (std::size_t j = 0; j < count; ++j) check_point(listed.element(j));
-    }
-}
-
-Pick read_pick(const Cursor& where, const PickMattes& mattes, std::set<std::string>& taken,
-               std::size_t& keys, std::size_t& points) {
-    if (mattes.version == 1) {
-        // From "radius" on: picks moved palette colours. These members no longer do anything.
-        where.require_members(
-            {"id", "kind", "frame", "rgb"},
-            {"to", "toward", "from", "until", "fade", "enabled", "path", "pixel", "box", "radius",
-             "global_only", "spread", "residual", "worst", "worst_frame", "global"});
-    } else {
-        where.require_members(
-            {"id", "kind", "frame", "rgb"},
-            {"to", "toward", "from", "until", "fade", "enabled", "path", "pixel", "box", "areas",
-             "matte", "whole_hue", "reach", "softness", "lightness"});
-    }
+Pick read_pick(const Cursor& where, const PickMattes& mattes, Counts& counts) {
+    const Json& fields = where.json();
+    const auto number = [&](const char* name, double without) {
+        return fields.value(name, without);
+    };
+    const auto frame = [&](const char* name) {
+        return where.has(name) ? std::optional(where.member(name).number()) : std::nullopt;
+    };
     Pick pick;
-    pick.id = where.member("id").id();
-    claim(taken, where.member("id"), pick.id);
-    pick.hold = where.member("kind").choice({"pick", "hold"}) == 1;
-    pick.frame = where.member("frame").frame();
-    pick.rgb = pick.to = where.member("rgb").rgb();
-    if (where.has("to")) pick.to = where.member("to").rgb();
-    if (where.has("toward")) {
-        pick.toward_colour = where.member("toward").choice({"shift", "colour"}) == 1;
-    }
-    if (where.has("from")) pick.from = where.member("from").frame();
-    if (where.has("until")) pick.until = where.member("until").frame();
-    if (where.has("fade")) {
-        pick.fade = where.member("fade").number(0, static_cast<double>(kMaxFrame));
-    }
-    if (where.has("enabled")) pick.enabled = where.member("enabled").flag();
+    pick.id = where.member("id").text();
+    claim(counts.ids, where.member("id"));
+    pick.hold = where.member("kind").is("hold");
+    pick.frame = where.member("frame").number();
+    pick.rgb = pick.to = where.member("rgb").three();
+    if (where.has("to")) pick.to = where.member("to").three();
+    pick.toward_colour = where.has("toward") && where.member("toward").is("colour");
+    pick.from = frame("from");
+    pick.until = frame("until");
+    pick.fade = number("fade", 0);
+    pick.enabled = fields.value("enabled", true);
     if (where.has("path")) {
         const Cursor path = where.member("path");
+        path.limit(counts.keys += path.size(), kMaxPathKeys, "colours over time in all");
         std::optional<double> previous;
-        const std::size_t count = path.list("colours over time in all", kMaxPathKeys, keys);
-        keys += count;
-        for (std::size_t i = 0; i < count; ++i) {
-            const Cursor step = path.element(i);
-            step.require_members({"frame", "rgb"}, {"given", "there"});
-            PathKey key{step.member("frame").later_frame(previous), step.member("rgb").rgb()};
-            if (step.has("given")) step.member("given").flag();
-            if (step.has("there")) key.there = step.member("there").number(0, 1);
-            pick.path.push_back(key);
+        for (std::size_t i = 0; i < path.size(); ++i) {
+            const Cursor key = path.element(i);
+            pick.path.push_back({key.member("frame").later(previous), key.member("rgb").three(),
+                                 key.json().value("there", 1.0)});
         }
     }
-    check_places(where, points);
-    if (where.has("whole_hue")) where.member("whole_hue").flag();
-    if (where.has("reach")) pick.reach = where.member("reach").number(-kMaxReach, kMaxReach);
-    if (where.has("softness")) pick.softness = where.member("softness").number(0, 1);
+    if (where.has("areas")) {
+        const Cursor areas = where.member("areas");
+        for (std::size_t i = 0; i < areas.size(); ++i) {
+            const Cursor area = areas.element(i), points = area.member("points");
+            points.limit(counts.points += points.size(), kMaxPoints, "points of areas in all");
+        }
+    }
+    pick.reach = number("reach", pick.reach);
+    pick.softness = number("softness", pick.softness);
     if (where.has("lightness")) {
         const Cursor range = where.member("lightness");
-        if (range.list("2 numbers, lowest and highest") != 2) {
-            range.wrong("a list of 2 numbers, lowest and highest");
-        }
-        pick.darkest = range.element(0).number(0.0, 1.0);
-        pick.lightest = range.element(1).number(0.0, 1.0);
+        pick.darkest = range.element(0).number();
+        pick.lightest = range.element(1).number();
         if (!(pick.darkest < pick.lightest)) {
             range.wrong("a lowest lightness below the highest one");
         }
     }
     if (where.has("matte")) {
         const Cursor name = where.member("matte");
-        const std::string id = name.id();
-        const auto grid = mattes.grids.find(id);
+        const auto grid = mattes.grids.find(name.text());
         if (grid == mattes.grids.end()) {
-            name.fail("the matte " + in_quotes(id), "an id in the file's member \"mattes\"");
+            name.fail("the matte " + in_quotes(name.text()),
+                      "an id in the file's member \"mattes\"");
         }
         pick.matte = grid->second.matte;
     } else {
@@ -118,26 +86,7 @@ Pick read_pick(const Cursor& where, const PickMattes& mattes, std::set<std::stri
     return pick;
 }
 
-/// Names of mattes are ids, as Cursor::id() has them.
-void require_id(const Cursor& grids, const std::string& name) {
-    bool valid = !name.empty() && name.size() <= 64;
-    for (std::size_t i = 0; valid && i < name.size(); ++i) {
-        const char c = name[i];
-        const bool word =
-            (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-        valid = word || (i > 0 && (c == '_' || c == '-' || c == '.'));
-    }
-    if (!valid) {
-        grids.fail("the member " + in_quotes(name),
-                   "ids: 1 to 64 letters, digits, '_', '-' or '.', a letter or a digit first");
-    }
-}
-
 Matte matte_from(const Cursor& grid, const std::string& text) {
-    if (text.size() > kMaxMatteText) {
-        grid.fail("a text of " + std::to_string(text.size()) + " characters",
-                  "at most " + std::to_string(kMaxMatteText));
-    }
     const char* const wanted =
         "base64 of a zlib stream of 147456 differences of log odds (docs/sidecar.md)";
     const std::optional<std::string> stream = from_base64(text);
@@ -157,45 +106,32 @@ Matte matte_from(const Cursor& grid, const std::string& text) {
 
 }  // namespace
 
-PickMattes read_mattes(const Cursor& where, int version, const PickMattes& known) {
+PickMattes read_mattes(const Cursor& where, const PickMattes& known) {
     PickMattes mattes;
-    if (version == 1) where.fail("mattes in a file of version 1", "version 2");
-    where.require_members({"grids"}, {"display"});
     if (where.has("display")) {
-        const Cursor curve = where.member("display");
-        curve.require_members({"from", "to", "values"});
-        DisplayCurve display{curve.member("from").number(-kMaxColour, kMaxColour),
-                             curve.member("to").number(-kMaxColour, kMaxColour),
-                             {}};
-        if (!(display.from < display.to)) curve.member("to").wrong("a number above \"from\"");
-        const Cursor values = curve.member("values");
-        const std::size_t count = values.list("values", 4096);
-        if (count < 2) values.wrong("at least 2 values");
-        for (std::size_t i = 0; i < count; ++i) {
-            display.values.push_back(values.element(i).number(-kMaxColour, kMaxColour));
-        }
+        const Cursor curve = where.member("display"), to = curve.member("to");
+        DisplayCurve display{curve.member("from").number(), to.number(), curve.json()["values"]};
+        if (!(display.from < display.to)) to.wrong("a number above \"from\"");
         mattes.display = std::make_shared<const DisplayCurve>(std::move(display));
     }
     const Cursor grids = where.member("grids");
-    for (const std::string& id : grids.names("mattes", kMaxPicks)) {
-        require_id(grids, id);
-        const Cursor grid = grids.member(id.c_str());
+    for (const auto& [id, value] : grids.json().items()) {
         const auto same = known.grids.find(id);
-        std::string text = grid.text();
+        std::string text = value;
         mattes.grids[id] =
             same != known.grids.end() && same->second.text == text
                 ? same->second
-                : PickMattes::Grid{text, std::make_shared<const Matte>(matte_from(grid, text))};
+                : PickMattes::Grid{text, std::make_shared<const Matte>(
+                                             matte_from(grids.member(id.c_str(), value), text))};
     }
     return mattes;
 }
 
 std::vector<Pick> read_picks(const Cursor& where, const PickMattes& mattes) {
     std::vector<Pick> picks;
-    std::set<std::string> taken;
-    std::size_t keys = 0, points = 0;
-    for (std::size_t i = 0, n = where.list("picks and holds", kMaxPicks); i < n; ++i) {
-        picks.push_back(read_pick(where.element(i), mattes, taken, keys, points));
+    Counts counts;
+    for (std::size_t i = 0; i < where.size(); ++i) {
+        picks.push_back(read_pick(where.element(i), mattes, counts));
     }
     return picks;
 }

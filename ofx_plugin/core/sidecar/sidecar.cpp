@@ -8,39 +8,23 @@
 
 #include "sidecar/codec.hpp"
 #include "sidecar/members.hpp"
+#include "sidecar/schema.hpp"
 
 namespace palette4d {
 namespace {
 
-int read_head(const Cursor& root) {
-    root.require_object();
-    const Cursor schema = root.member("schema");
-    if (schema.text() != "palette4d.sidecar") schema.wrong("\"palette4d.sidecar\"");
-    const Cursor version = root.member("version");
-    const std::int64_t number = version.integer(1, kMaxFrame);
-    if (number > kSidecarVersion) {
-        version.fail(
-            "version " + std::to_string(number) + ", written by a newer palette4d",
+/// Checks the members against the schema.
+void check_members(const Cursor& root) {
+    if (!root.json().is_object()) root.wrong("an object");
+    const bool ours = root.has("schema") && root.member("schema").is("palette4d.sidecar");
+    const Json version = root.json().value("version", Json());
+    const double number = version.is_number() ? version.get<double>() : 0;
+    if (ours && number > kSidecarVersion) {
+        root.member("version").fail(
+            "version " + version.dump() + ", written by a newer palette4d",
             "version " + std::to_string(kSidecarVersion) + "; update palette4d to read this file");
     }
-    root.require_members(
-        {"schema", "version", "generator", "clip", "polytope", "quality", "edits", "extra"},
-        {"colours", "versions", "history", "mattes"});
-    root.member("generator").text();
-    root.member("extra").require_object();
-    return static_cast<int>(number);
-}
-
-void read_quality(const Cursor& quality) {
-    quality.require_members({"stages", "options", "versions"});
-    const Cursor stages = quality.member("stages");
-    for (std::size_t i = 0, n = stages.list("stages"); i < n; ++i) {
-        const Cursor stage = stages.element(i);
-        stage.require_scalars();
-        stage.member("stage").text();
-    }
-    quality.member("options").require_scalars();
-    quality.member("versions").require_scalars();
+    check(root, sidecar_schema(), number == 1 ? 1 : kSidecarVersion);
 }
 
 }  // namespace
@@ -48,24 +32,21 @@ void read_quality(const Cursor& quality) {
 Sidecar sidecar_of(const Json& members, const std::string& name) {
     const Cursor root(members, name);
     Sidecar sidecar;
-    const int version = read_head(root);
+    check_members(root);
     const Cursor clip = root.member("clip");
     sidecar.clip = read_clip(clip);
     if (clip.has("conversion")) {
         sidecar.conversion = read_conversion(clip.member("conversion"), name);
     }
     sidecar.polytope = read_polytope(root.member("polytope"), sidecar.clip, name);
-    read_quality(root.member("quality"));
     PickMattes& mattes = sidecar.mattes;
-    if (root.has("mattes")) mattes = read_mattes(root.member("mattes"), version, {});
-    mattes.version = version;
+    if (root.has("mattes")) mattes = read_mattes(root.member("mattes"), {});
     mattes.frame_step = static_cast<double>(sidecar.clip.step);
     sidecar.edits = read_edits(root.member("edits"), sidecar.polytope, mattes);
     if (root.has("versions")) {
         sidecar.versions = read_versions(root.member("versions"), sidecar.polytope, mattes);
     }
     if (root.has("colours")) check_colours(root.member("colours"));
-    if (root.has("history")) root.member("history").require_object();
     return sidecar;
 }
 
@@ -74,8 +55,10 @@ Sidecar with_edits(const Sidecar& palette, const Json& edits, const Json& mattes
     Sidecar result{palette.clip, palette.polytope, {}, {}, {}, palette.conversion};
     const Json members = {{"edits", edits}, {"mattes", mattes}};
     const Cursor root(members, name);
-    result.mattes = read_mattes(root.member("mattes"), kSidecarVersion, palette.mattes);
-    result.mattes.version = kSidecarVersion;
+    for (const char* const part : {"edits", "mattes"}) {
+        check(root.member(part), sidecar_schema().member(part), kSidecarVersion);
+    }
+    result.mattes = read_mattes(root.member("mattes"), palette.mattes);
     result.mattes.frame_step = palette.mattes.frame_step;
     result.edits = read_edits(root.member("edits"), palette.polytope, result.mattes);
     return result;
@@ -87,7 +70,10 @@ Sidecar parse_sidecar(const std::string& text, const std::string& name) {
 
 ColourConversion parse_conversion(const std::string& text, const std::string& name) {
     const Json tree = json_tree(text, name);
-    return read_steps(Cursor(tree, name), name, "");
+    const Cursor steps(tree, name);
+    const Schema& clip = sidecar_schema().member("clip");
+    check(steps, clip.member("conversion").member("steps"), kSidecarVersion);
+    return read_steps(steps, name, "");
 }
 
 Sidecar read_sidecar(const std::string& path) {

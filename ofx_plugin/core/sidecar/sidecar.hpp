@@ -45,7 +45,6 @@ struct PickMattes {
     };
     std::unordered_map<std::string, Grid> grids;  ///< by their ids
     std::shared_ptr<const DisplayCurve> display;
-    int version = 0;        ///< of the file
     double frame_step = 1;  ///< Edits::frame_step
 };
 
