@@ -190,7 +190,6 @@ class TestLines:
         [
             ("001 A V", "line 4: found '001 A V', expected an event such as"),
             (f"001 A V C {FOUR} 01:00:00:00 01:00:04:24", "line 4: found the timecode 01:00:04:24"),
-            (f"001 A V C {FOUR} {FOUR}\n002 A V KB 024 {FOUR} {FOUR}", "line 5: found a key"),
         ],
     )
     def test_errors_name_the_line(self, line: str, words: str, tmp_path: Path) -> None:

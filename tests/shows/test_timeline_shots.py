@@ -544,13 +544,19 @@ class TestHostile:
             edit(made, tmp_path)
 
     @pytest.mark.parametrize("kind", ["Gap", "Clip"])
-    def test_what_has_no_length_costs_the_shots_behind_it(
+    def test_what_has_no_length_costs_the_places_behind_it(
         self, kind: str, tmp_path: Path, plates: Path
     ) -> None:
-        item = getattr(otio.schema, kind)()
-        item.source_range = None
+        """The frames of the shots behind it are known, unless the track is cut somewhere."""
         good = external("plates/b/take.mov")
-        made = timeline(clip("a", good, 5, 10), item, clip("b", good, 5, 10))
+        item = otio.schema.Clip("x", good) if kind == "Clip" else otio.schema.Gap()
+        item.source_range = None
+        made = timeline(clip("a", good, 5, 10), item, clip("b", good, 7, 10))
+        found = {shot.name: shot for shot in edit(made, tmp_path).shots}
+        assert [found[name].used for name in "ab"] == [(5, 14), (7, 16)]
+        assert [found[name].place.record for name in "ab"] == ["00:00:00:00", ""]
+        assert [name for name, shot in found.items() if shot.problem] == ["x"] * (kind == "Clip")
+        made.tracks[0].source_range = span(2, 20)
         found = {shot.name: shot.problem for shot in edit(made, tmp_path).shots}
         assert not found["a"]
         assert f"a {kind.lower()} before it has no length" in found["b"]

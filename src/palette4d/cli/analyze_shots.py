@@ -55,6 +55,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "next cut (default 0)",
     )
     group.add_argument(
+        "--conform",
+        choices=("by-rates", "frame-for-frame"),
+        help="how an edit plays movies of another rate than its own (default: docs/shots.md)",
+    )
+    group.add_argument(
         "--only", metavar="A,B", type=_names, default=(), help="only the shots of these names"
     )
     group.add_argument(
@@ -73,7 +78,11 @@ def _names(text: str) -> tuple[str, ...]:
 def is_show(args: argparse.Namespace) -> bool:
     """Whether to analyse many shots; options that conflict are wrong usage."""
     edit = is_timeline(args.clip)
-    for_edits = {"--media": args.media is not None, "--handles": args.handles is not None}
+    for_edits = {
+        "--media": args.media is not None,
+        "--handles": args.handles is not None,
+        "--conform": args.conform is not None,
+    }
     for_shows = {
         "--only": bool(args.only),
         "--force": args.force,
@@ -115,6 +124,7 @@ def run(args: argparse.Namespace, settings: dict[str, Any]) -> int:
                 frames=args.frames,
                 media=args.media,
                 handles=args.handles or 0,
+                conform=args.conform,
                 only=args.only,
                 jobs=args.jobs,
                 cluster=args.cluster,

@@ -37,6 +37,7 @@ from palette4d.media.clip_base import (
     named,
 )
 from palette4d.media.colour_tags import LUMA_WEIGHTS, MATRICES, UNKNOWN, UNREADABLE, encoding_of
+from palette4d.media.movie_boxes import boxes
 from palette4d.media.movie_pixels import (
     bin_picture,
     is_luma_chroma,
@@ -345,19 +346,9 @@ def opened_movie(path: Path) -> Any:
 
 def _lacks_index(path: Path) -> bool:
     """Whether a file is a .mov or .mp4 without the box `moov`, which is written last."""
-    kinds: set[bytes] = set()
-    at = 0
     try:
         with path.open("rb") as file:
-            while len(head := file.read(16)) >= 8 and len(kinds) < 64:
-                size = int.from_bytes(head[:4], "big")
-                if size == 1:  # a size of 64 bits follows
-                    size = int.from_bytes(head[8:], "big")
-                kinds.add(head[4:8])
-                if size < 8:  # up to the file's end
-                    break
-                at += size
-                file.seek(at)
+            kinds = {kind for kind, _ in boxes(file)}
     except OSError:
         return False
     return bool(kinds & {b"ftyp", b"mdat", b"wide"}) and b"moov" not in kinds

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import av
@@ -13,8 +14,10 @@ from av.filter import Graph
 from av.sidedata.sidedata import Type
 
 from palette4d.media.colour_tags import ColourTags
+from palette4d.media.movie_boxes import boxes
 from palette4d.media.movie_pixels import FULL_RANGE, is_luma_chroma, turn
 from palette4d.media.stated import Fields, Stated
+from palette4d.media.timecode import nominal
 
 # What is about the source's file, or is stated elsewhere.
 _OF_THE_FILE = re.compile(
@@ -25,6 +28,8 @@ _OF_THE_FILE = re.compile(
 _TIMECODE = re.compile(r"([0-9]{2}:[0-9]{2}:[0-9]{2}[:;.][0-9]{2,3})")
 # AVFieldOrder: unknown, progressive, then four of interlaced pictures.
 _PROGRESSIVE, _TOP_FIRST = 1, (2, 4)
+#: Bytes of the largest index of a movie that is searched for its timecode track.
+_MOST_INDEX = 256 << 20
 
 
 def stated_by(container: Any, stream: Any, picture: av.VideoFrame) -> Stated:
@@ -49,7 +54,7 @@ def stated_by(container: Any, stream: Any, picture: av.VideoFrame) -> Stated:
         fields=fields,
         field_order=order if fields else 0,
         reel=_first(container, "reel_name"),
-        timecode=timecode_of(container),
+        timecode=timecode_of(container, stream.average_rate),
         texts=tuple(
             (str(name), str(text))
             for name, text in container.metadata.items()
@@ -79,10 +84,36 @@ def _hdr10(picture: av.VideoFrame) -> str:
     return ":".join(texts)
 
 
-def timecode_of(container: Any) -> str:
-    """Return the timecode of a movie's first frame, `HH:MM:SS:FF`, or ""."""
+def timecode_of(container: Any, rate: Fraction | None) -> str:
+    """Return the timecode of a movie's first frame, `HH:MM:SS:FF`, or "".
+
+    It counts at the movie's rate. The track of a file may count pairs of frames (SMPTE ST 12-1).
+    """
     found = _TIMECODE.search(_first(container, "timecode"))
-    return found[0] if found else ""
+    if found is None:
+        return ""
+    text, base = found[0], nominal(rate) if rate else 0
+    counted = _counted_by_track(container.name.removeprefix("file:")) if base > 30 else 0
+    if 0 < counted < base and base % counted == 0:
+        return f"{text[:9]}{int(text[9:]) * (base // counted):02d}"
+    return text
+
+
+def _counted_by_track(path: str) -> int:
+    """Return the frames a second that the timecode track of a .mov counts; 0 if there is none."""
+    head = b""
+    try:
+        with Path(path).open("rb") as file:
+            for kind, size in boxes(file):
+                if kind == b"moov" and size < _MOST_INDEX:
+                    head = file.read(size)
+    except OSError:
+        return 0
+    # QuickTime File Format, "Timecode sample description": time scale and a frame's duration.
+    # FFmpeg counts at their ratio, whatever the number of frames that stands behind them.
+    found = re.search(rb"stsd.{12}tmcd.{16}(.{4})(.{4})", head, re.DOTALL)
+    scale, duration = (int.from_bytes(one, "big") for one in found.groups()) if found else (0, 0)
+    return round(scale / duration) if duration else 0
 
 
 def _first(container: Any, name: str) -> str:

@@ -43,13 +43,54 @@ def frames_of(timecode: str, rate: Fraction, drop: bool = False) -> int | None:
     if minutes > 59 or seconds > 59 or frames >= base:
         return None
     count = ((hours * 60 + minutes) * 60 + seconds) * base + frames
-    if base % 30 or not (drop or found[4] != ":"):
+    if not (drop or found[4] != ":"):
         return count
-    skipped = base // 15  # of each minute but the tenth, twentieth, …
+    skipped = skipped_a_minute(rate)
     if minutes % 10 and not seconds and frames < skipped:
         return None
     whole = hours * 60 + minutes
     return count - skipped * (whole - whole // 10)
+
+
+def skipped_a_minute(rate: Fraction) -> int:
+    """Return the numbers that drop-frame timecode leaves out a minute, but for each tenth one.
+
+    >>> skipped_a_minute(Fraction(30000, 1001)), skipped_a_minute(Fraction(25))
+    (2, 0)
+    """
+    return 0 if nominal(rate) % 30 else nominal(rate) // 15
+
+
+def drops_numbers(timecode: str, rate: Fraction) -> bool:
+    """Whether a timecode is one that leaves numbers out, by its last separator."""
+    return bool(skipped_a_minute(rate)) and timecode.rstrip("0123456789")[-1:] not in ("", ":")
+
+
+def day_of(rate: Fraction, drop: bool = False) -> int:
+    """Return the frames of 24 hours of timecode, which then begins again.
+
+    >>> day_of(Fraction(24)), day_of(Fraction(30000, 1001), drop=True)
+    (2073600, 2589408)
+    """
+    return 144 * (600 * nominal(rate) - (9 * skipped_a_minute(rate) if drop else 0))
+
+
+def nearest(frames: int, other: int, day: int) -> int:
+    """Return a count of frames, moved by whole days to the one that is nearest to another count.
+
+    >>> nearest(12, 2073588, day_of(Fraction(24)))
+    2073612
+    """
+    return other + (frames - other + day // 2) % day - day // 2
+
+
+def label_of(frames: int, rate: Fraction, drop: bool = False) -> str:
+    """Return the timecode of a count of frames from 00:00:00:00, past 24 hours from there again.
+
+    >>> label_of(2073612, Fraction(24)), label_of(1800, Fraction(30000, 1001), drop=True)
+    ('00:00:00:12', '00:01:00;02')
+    """
+    return moved("00:00:00;00" if drop else "00:00:00:00", frames, rate)
 
 
 def start_timecode(clip: Clip, rate: Fraction | None = None) -> str | None:
@@ -121,9 +162,9 @@ def moved(timecode: str, frames: int, rate: Fraction) -> str:
     if before is None:
         return ""
     base, separator, digits = nominal(rate), timecode[8], len(timecode) - 9
-    drop = base // 15 if separator != ":" and base % 30 == 0 else 0
+    drop = skipped_a_minute(rate) if separator != ":" else 0
     of_ten, of_one = 600 * base - 9 * drop, 60 * base - drop
-    tens, count = divmod((before + frames) % (144 * of_ten), of_ten)
+    tens, count = divmod((before + frames) % day_of(rate, drop > 0), of_ten)
     if count >= 60 * base:  # the first minute of ten drops none
         count += drop * (1 + (count - 60 * base) // of_one)
     seconds, frame = divmod(tens * 600 * base + count, base)

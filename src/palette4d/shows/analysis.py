@@ -20,6 +20,7 @@ from palette4d.shows.batch import Show, ShowOptions, Source, analyse
 from palette4d.shows.manifest import FAILED
 from palette4d.shows.shots import Shot
 from palette4d.shows.timeline_files import is_timeline
+from palette4d.shows.timeline_shots import Conform
 
 Progress = Callable[[str, int, int], object]
 
@@ -32,6 +33,7 @@ def analyze_shots(
     rate: Fraction | None = None,
     media: str | os.PathLike[str] | None = None,
     handles: int = 0,
+    conform: Conform | None = None,
     only: Iterable[str] = (),
     skip_bad_frames: bool = False,
     allow_cuts: bool = False,
@@ -64,6 +66,9 @@ def analyze_shots(
         The folder with the edit's media, found by name; by default the edit's own paths.
     handles : int
         Head and tail frames around each shot of an edit.
+    conform : {"by-rates", "frame-for-frame"}, optional
+        How an edit plays movies of another rate: in their own time, or each frame as one of its
+        own. By default as docs/shots.md says.
     only : iterable of str
         The names of the shots to analyse; by default all.
     on_edits : {"refuse", "keep", "drop"}
@@ -106,7 +111,7 @@ def analyze_shots(
         workers=Workers(jobs, cluster),
     )
     if is_timeline(name):
-        source, found, notes = _of_edit(Path(name), rate, media, handles)
+        source, found, notes = _of_edit(Path(name), rate, media, handles, conform)
     else:
         opened = open_clip(name, frames=frames, rate=rate, skip_bad_frames=skip_bad_frames)
         found = shots.detect(opened, lambda done, total: tell("cuts", done, total))
@@ -129,12 +134,16 @@ def analyze_shots(
 
 
 def _of_edit(
-    path: Path, rate: Fraction | None, media: str | os.PathLike[str] | None, handles: int
+    path: Path,
+    rate: Fraction | None,
+    media: str | os.PathLike[str] | None,
+    handles: int,
+    conform: Conform | None,
 ) -> tuple[Source, list[Shot], list[str]]:
     """Return an edit, its shots, and notes."""
     edit = timeline_clips.read(path, rate)
     folder = None if media is None else find_media.Folder(Path(media))
-    listed, counting = timeline_shots.shots_of(edit, folder, handles)
+    listed, counting = timeline_shots.shots_of(edit, folder, handles, conform)
     found, renamed = shots.numbered(listed)
     notes = [f"not analysed: {note}" for note in edit.notes] + counting
     if timeline_files.is_edl(path) and rate is None:

@@ -8,17 +8,23 @@ from __future__ import annotations
 
 import codecs
 import dataclasses
-import math
+import itertools
 import re
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 from palette4d.common.errors import Arg, Palette4dError
-from palette4d.media.timecode import frames_of
+from palette4d.media.timecode import (
+    day_of,
+    drops_numbers,
+    frames_of,
+    nearest,
+    skipped_a_minute,
+)
 
 _TIME = r"([0-9]{1,2}[:;][0-9]{2}[:;][0-9]{2}[:;.,][0-9]{2,3}|[0-9]+)"
 _LINE = re.compile(
-    r"([0-9]+)\s+(?:(\S.*?)\s+)?(\S+)\s+(C|D|W[0-9]{3}|KB?|KO)\s+(?:([0-9]{1,3})\s+)?"
+    r"([0-9]+)\s+(?:(\S.*?)\s+)?(\S+)\s+(C|D|W[0-9]{3}|K(?:\s*[BO])?)\s+(?:([0-9]{1,3})\s+)?"
     + r"\s+".join([_TIME] * 4)
     + r"\s*"
 )
@@ -29,7 +35,11 @@ _SHAPE = "001 A001C001 V C 01:00:00:00 01:00:02:00 01:00:00:00 01:00:02:00"
 
 @dataclasses.dataclass(frozen=True)
 class EventLine:
-    """One numbered line; times are frames from 00:00:00:00."""
+    """One numbered line; times are frames from 00:00:00:00, also past midnight.
+
+    `drops` and `record_drops`: whether the timecodes of source and record leave numbers out; None
+    for a source in frames.
+    """
 
     number: str
     reel: str
@@ -38,6 +48,18 @@ class EventLine:
     length: str
     source: tuple[int, int]
     record: tuple[int, int]
+    drops: bool | None
+    record_drops: bool
+
+    @property
+    def frames(self) -> int:
+        """How many frames of the edit it has."""
+        return self.record[1] - self.record[0]
+
+    @property
+    def is_black(self) -> bool:
+        """Whether it shows black instead of a clip."""
+        return self.reel in ("BL", "BLACK")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,7 +68,7 @@ class Event:
 
     Attributes
     ----------
-    lines : one, or for a transition that of the clip before and its own.
+    lines : one, or for a transition also that of the clip before, without a length.
     comments : as they stand in the file.
     place : the number of the last line of the event in the file, with its comments.
     """
@@ -122,7 +144,31 @@ def events_of(text: str, rate: Fraction) -> list[Event]:
     found: list[Event] = []
     for block, comments, place in _blocks(text, rate):
         found += [Event(lines, comments, place) for lines in _pairs(block)]
-    return found
+    return _past_midnight(found, rate)
+
+
+def _past_midnight(events: list[Event], rate: Fraction) -> list[Event]:
+    """Count the record past midnight, where it begins again at 00:00:00:00.
+
+    Each line is counted nearest to the first one, so that events may come in any order.
+    """
+    lines = [line for event in events for line in event.lines]
+    day = day_of(rate, bool(lines) and lines[0].record_drops)
+    crosses = any(line.record[1] >= day for line in lines)
+    falls = (a.record[0] - b.record[0] > day // 2 for a, b in itertools.pairwise(lines))
+    if not crosses and not any(falls):
+        return events
+    first = lines[0].record[0]
+    begins = [nearest(line.record[0], first, day) for line in lines]
+    later = day if min(begins) < 0 else 0
+    moved = (
+        dataclasses.replace(line, record=(begin + later, begin + later + line.frames))
+        for line, begin in zip(lines, begins, strict=True)
+    )
+    return [
+        dataclasses.replace(event, lines=tuple(itertools.islice(moved, len(event.lines))))
+        for event in events
+    ]
 
 
 def _blocks(text: str, rate: Fraction) -> Iterator[tuple[list[EventLine], tuple[str, ...], int]]:
@@ -137,7 +183,9 @@ def _blocks(text: str, rate: Fraction) -> Iterator[tuple[list[EventLine], tuple[
             drop = _drops(line)
         elif line[:1].isdigit():
             event = _event_line(line, index, rate, drop)
-            if block and (comments or int(event.number) != int(block[0].number)):
+            if block and _goes_on(block, event):
+                comments = []  # those of the clip that ends here
+            elif block and (comments or int(event.number) != int(block[0].number)):
                 yield block, tuple(comments), place
                 block, comments = [], []
             block.append(event)
@@ -149,6 +197,17 @@ def _blocks(text: str, rate: Fraction) -> Iterator[tuple[list[EventLine], tuple[
         yield block, tuple(comments), place
 
 
+def _goes_on(block: list[EventLine], line: EventLine) -> bool:
+    """Whether a line is the second one of a transition, with comments between the two or not."""
+    before = block[-1]
+    return (
+        line.kind[0] in "DW"
+        and before.kind == "C"
+        and not before.frames
+        and (int(before.number), before.channel) == (int(line.number), line.channel)
+    )
+
+
 def _pairs(block: list[EventLine]) -> Iterator[tuple[EventLine, ...]]:
     """Yield the events of lines with one number: a transition has two lines of one channel."""
     before: EventLine | None = None
@@ -157,10 +216,13 @@ def _pairs(block: list[EventLine]) -> Iterator[tuple[EventLine, ...]]:
             if before is not None:
                 yield (before,)
             before = line
-        elif before is not None and before.channel == line.channel:
+        elif before is not None and _goes_on([before], line):
             yield before, line
             before = None
         else:
+            if before is not None and before.channel == line.channel:
+                yield (before,)
+                before = None
             yield (line,)
     if before is not None:
         yield (before,)
@@ -173,15 +235,28 @@ def _event_line(line: str, index: int, rate: Fraction, drop: bool) -> EventLine:
             f"line {index}: found {line!r:.90}, expected an event such as {_SHAPE}"
         )
     number, reel, channel, kind, length, *times = match.groups()
-    frames = [_count(time, index, rate, drop) for time in times]
+    start, end, begin, stop = (_count(time, index, rate, drop) for time in times)
+    drop = drop and skipped_a_minute(rate) > 0
+    drops, record_drops = (drop or drops_numbers(time, rate) for time in (times[0], times[2]))
+    if not times[2].isdigit() and begin - stop > day_of(rate, record_drops) // 2:
+        stop += day_of(rate, record_drops)
+    if not times[0].isdigit() and end - start != stop - begin:
+        end = nearest(end, start, day_of(rate, drops))
+    if stop < begin:
+        raise Palette4dError(
+            f"line {index}: found a record from {times[2]} to {times[3]}, which ends before it "
+            "begins; mend it in the edit"
+        )
     return EventLine(
         number,
         "_".join((reel or "AX").split()),
         channel,
-        kind,
+        "".join(kind.split()),
         length or "",
-        (frames[0], frames[1]),
-        (frames[2], frames[3]),
+        (start, end),
+        (begin, stop),
+        None if times[0].isdigit() else drops,
+        record_drops,
     )
 
 
@@ -198,128 +273,3 @@ def _count(time: str, index: int, rate: Fraction, drop: bool) -> int:
             f"do not have; name the rate of the EDL's timecodes with {Arg('rate')}"
         )
     return found
-
-
-@dataclasses.dataclass(frozen=True)
-class Motion:
-    """How an event plays its media.
-
-    Attributes
-    ----------
-    speed : how often the media's own speed; 1 if no motion effect says so.
-    start : the first frame of the media that `speed` counts from: backwards the last one played.
-    problem : the reason why it cannot be followed, or "".
-    """
-
-    speed: float
-    start: int
-    problem: str = ""
-
-
-#: The time effect of an event whose frames are not known; the effect's name is the reason.
-UNFOLLOWED = "palette4d.unfollowed"
-_M2 = re.compile(r"M2\s+(?:(\S.*)\s+)?([+-]?[0-9]+(?:\.[0-9]*)?)(?:\s+(\S.*))?")
-#: Frames per second by which M2 may be off: it has one decimal.
-ROUNDED = 0.0501
-_FREEZE = re.compile(r"\*\s*(\*\s*)?FREEZE FRAME")
-
-
-def is_motion(comment: str) -> bool:
-    """Whether a comment states how fast an event plays."""
-    return bool(re.match(r"M2\s", comment) or _FREEZE.match(comment))
-
-
-def motion_of(event: Event, rate: Fraction) -> Motion:
-    """Return how an event plays its media, of lines M2 and FREEZE FRAME, or of its lengths.
-
-    The source of an event is what it plays (CMX 3600), or it is as long as the record whatever the
-    speed (DaVinci Resolve). Lengths tell the two apart.
-    """
-    (start, end), (begin, stop) = event.own.source, event.own.record
-    frames, media = stop - begin, end - start
-    speeds = _speeds(event, rate)
-    if any(_FREEZE.match(comment) for comment in event.comments):
-        speeds = speeds or [(0.0, start)]
-    if not speeds:
-        if media == frames:
-            return Motion(1, start)
-        return Motion(
-            1,
-            start,
-            f"its source has {media} frames, its record {frames}, and no line M2 states the speed; "
-            "mend it in the edit",
-        )
-    speed, at = speeds[-1]
-    if frames <= 0:
-        return Motion(speed, start)
-    if speed == 0:
-        return Motion(0, start if at is None else at)
-    own = _of_lengths(media, frames, speed, rate)
-    if own is None:
-        return Motion(speed, start, _misfit(media, frames, speed))
-    if own > 0 and at not in (None, start):
-        return Motion(speed, start, _elsewhere(at - start if at else 0))
-    if own < 0 and media < 0:  # written as it plays: from a frame down to another
-        return Motion(own, round(start + own * (frames - 1)))
-    if own < 0 and at not in (None, start, end - 1, end):
-        return Motion(speed, start, _elsewhere(at - start if at else 0))
-    return Motion(own, start)
-
-
-def _of_lengths(media: int, frames: int, speed: float, rate: Fraction) -> float | None:
-    """Return the speed that fits the lengths of source and record; None if none does."""
-    length, fast = abs(media), abs(speed)
-    # Avid's source ends with the last frame that plays, others' with the last frame's end.
-    if fast * (frames - 1) - 1 <= length <= fast * frames + 1:
-        return speed
-    exact = math.copysign(length / frames, speed)
-    if abs(exact - speed) * rate <= 2 * ROUNDED:
-        return exact
-    return speed if media == frames and speed > 0 else None
-
-
-def _elsewhere(frames: int) -> str:
-    return (
-        f"its line M2 begins {frames} frames away from its source, so that the frames are not "
-        "known; expected the same timecode. Mend it in the edit"
-    )
-
-
-def _misfit(media: int, frames: int, speed: float) -> str:
-    return (
-        f"its source has {media} frames and its record {frames}, which do not fit the {speed:g} "
-        "times that its line M2 states; mend it in the edit, or analyse the media on its own"
-    )
-
-
-def _speeds(event: Event, rate: Fraction) -> list[tuple[float, int | None]]:
-    """Return (speed, first frame) of each line M2 that belongs to the event's own clip."""
-    found = []
-    for comment in event.comments:
-        if match := _M2.fullmatch(comment):
-            at = frames_of(match[3] or "", rate)
-            found.append(("_".join((match[1] or "").split()), _speed(float(match[2]), rate), at))
-    if len(event.lines) == 2 and len(found) > 1:
-        before, own = event.lines
-        # Of two clips in a transition, the one before may state its speed again.
-        others = [(reel, before.source[0]) for reel in (before.reel, "")]
-        found = [one for one in found if (one[0], one[2]) not in others] or found[-1:]
-        found = [one for one in found if one[0] in (own.reel, "")] or found[-1:]
-    elif len(event.lines) == 2 and found:
-        before, own = event.lines
-        at = found[0][2]
-        if at == before.source[0] != own.source[0] and found[0][0] == before.reel:
-            found = []
-    return [(speed, at) for _, speed, at in found]
-
-
-def _speed(fps: float, rate: Fraction) -> float:
-    """Return the speed of M2's frames per second: 2 for 48 at 24 and for 47.952 at 23.976.
-
-    Whole percents are likelier than what M2 rounds them to.
-    """
-    for base in (round(rate), float(rate)):
-        whole = round(100 * fps / base) / 100
-        if abs(whole * base - fps) <= ROUNDED:
-            return whole
-    return fps / round(rate)

@@ -1,8 +1,7 @@
 """The timeline of an EDL, with the frames, speeds and CDLs that its events state.
 
-OpenTimelineIO's adapter makes the timeline. It gets the events in the form that it reads: frame
-numbers, sources as long as records, each event with a number of its own. Motion effects and CDLs
-are put on the clips afterwards.
+OpenTimelineIO's adapter makes the timeline of the events that `edl_items` writes for it. Motion
+effects and CDLs are put on the clips afterwards.
 """
 
 from __future__ import annotations
@@ -13,11 +12,9 @@ from typing import Any
 
 from palette4d.common.errors import Arg, Palette4dError
 from palette4d.media.clip_base import DEFAULT_RATE, as_rate
-from palette4d.shows import edl_cdl, edl_text
-from palette4d.shows.edl_text import UNFOLLOWED, Event, Motion
-
-#: Begins a comment of ours: the adapter keeps comments with their clip.
-_MARK = "PALETTE4D EVENT"
+from palette4d.shows import edl_cdl, edl_items, edl_text
+from palette4d.shows.edl_items import Item
+from palette4d.shows.edl_motion import UNFOLLOWED
 
 
 def timeline_of(path: Path, data: bytes, rate: Fraction | None, otio: Any) -> Any:
@@ -41,26 +38,29 @@ def places_of(path: Path, data: bytes, rate: Fraction, otio: Any) -> dict[tuple[
         for k, item in enumerate(track)
         if isinstance(item, otio.schema.Clip)
     ]
-    return dict(zip(places, numbers, strict=True))
+    return {
+        place: number for place, number in zip(places, numbers, strict=True) if number is not None
+    }
 
 
-def _made(path: Path, data: bytes, rate: Fraction, otio: Any) -> tuple[Any, list[int]]:
+def _made(path: Path, data: bytes, rate: Fraction, otio: Any) -> tuple[Any, list[int | None]]:
     """Return the timeline, and the number of the event of each clip, in the timeline's order."""
     text = edl_text.decoded(data)
     try:
         _check_rate(rate, otio)
         events = edl_text.events_of(text, rate)
-        motions = [edl_text.motion_of(event, rate) for event in events]
-        written = [
-            _written(i, event, motion)
-            for i, (event, motion) in enumerate(zip(events, motions, strict=True))
-        ]
+        items = edl_items.items_of(events, rate)
+        # From 1: of a track that begins at 0 the adapter does not say so.
+        origin = min((item.line.record[0] for item in items), default=0) - 1
+        written = (item.text(origin) for item in items)
         source = "\n".join([f"TITLE: {edl_text.title_of(text)}", *written])
         made = otio.adapters.read_from_string(source, "cmx_3600", rate=float(rate))
     except Palette4dError as error:
         raise Palette4dError(f"{path}: {error}") from None
-    numbers = [_finish(clip, events, motions, otio) for clip in made.find_clips()]
-    _rebase(made, otio)
+    numbers = [_finish(clip, items, otio) for clip in made.find_clips()]
+    if events:
+        made.metadata[edl_items.NAMESPACE] = {"drop_frame": events[0].own.record_drops}
+    _rebase(made, origin, otio)
     return made, numbers
 
 
@@ -72,51 +72,30 @@ def _check_rate(rate: Fraction, otio: Any) -> None:
         )
 
 
-def _written(index: int, event: Event, motion: Motion) -> str:
-    """Return an event for the adapter."""
-    number = f"{index + 1:06d}"
-    lines = []
-    for line in event.lines:
-        source = motion.start if line is event.own else line.source[0]
-        begin, stop = line.record
-        if line.kind.startswith("K"):
-            raise Palette4dError(
-                f"line {event.place}: found a key, {line.kind}, which is not followed; expected a "
-                "cut (C), dissolve (D) or wipe (W001)"
-            )
-        kind = "C" if len(event.lines) == 1 else f"{line.kind} {line.length}".strip()
-        lines.append(
-            f"{number} {line.reel} {line.channel} {kind} {source} {source + stop - begin} "
-            f"{begin} {stop}"
-        )
-    kept = [
-        comment
-        for comment in event.comments
-        if not edl_text.is_motion(comment) and not edl_cdl.is_cdl(comment)
-    ]
-    return "\n".join([*lines, *kept, f"* {_MARK} {index}"])
+def _finish(clip: Any, items: list[Item], otio: Any) -> int | None:
+    """Put a motion effect and a CDL on an item's clip, and take our comment from it.
 
-
-def _finish(clip: Any, events: list[Event], motions: list[Motion], otio: Any) -> int:
-    """Put an event's motion effect and CDL on its clip, and take our comment from it.
-
-    Return the event's number in the list.
+    Return the number of its event in the list; None for what the event before plays on.
     """
-    own = clip.metadata["cmx_3600"]
+    own = clip.metadata[edl_items.NAMESPACE]
     comments = [str(comment) for comment in own["comments"]]
-    mark = next(comment for comment in comments if comment.startswith(_MARK))
-    index = int(mark.removeprefix(_MARK))
-    rest = [comment for comment in comments if comment != mark]
-    if rest:
-        own["comments"] = rest
+    mark = next(comment for comment in comments if comment.startswith(edl_items.MARK))
+    item = items[int(mark.removeprefix(edl_items.MARK))]
+    comments.remove(mark)
+    if comments:
+        own["comments"] = comments
     else:
         del own["comments"]
-    if not own:
-        del clip.metadata["cmx_3600"]
+    own["drop_frame"] = item.line.drops
     # The adapter counts numbers of its own.
-    if clip.name == f"{index + 1:06d}":
-        clip.name = events[index].own.number
-    motion, schema = motions[index], otio.schema
+    if clip.name == item.name:
+        clip.name = item.line.number
+    motion, schema = item.motion, otio.schema
+    start = otio.opentime.RationalTime(motion.start, clip.source_range.duration.rate)
+    for one in (clip, clip.media_reference):
+        name = "source_range" if one is clip else "available_range"
+        if (counted := getattr(one, name)) is not None:
+            setattr(one, name, otio.opentime.TimeRange(start, counted.duration))
     if motion.problem:
         clip.effects.append(schema.TimeEffect(name=motion.problem, effect_name=UNFOLLOWED))
     elif motion.speed == 0:
@@ -124,16 +103,17 @@ def _finish(clip: Any, events: list[Event], motions: list[Motion], otio: Any) ->
         clip.effects.append(schema.FreezeFrame())
     elif motion.speed != 1:
         clip.effects.append(schema.LinearTimeWarp(time_scalar=motion.speed))
-    if cdl := edl_cdl.of_comments(events[index].comments):
+    if item.number is not None and (cdl := edl_cdl.of_comments(item.comments)):
         clip.metadata["cdl"] = cdl.metadata
-    return index
+    return item.number
 
 
-def _rebase(timeline: Any, otio: Any) -> None:
+def _rebase(timeline: Any, origin: int, otio: Any) -> None:
     """Let all tracks of an EDL begin with the first track; later tracks get a leading gap.
 
-    The EDL adapter stores a track's first record timecode as a negative start. OpenTimelineIO would
-    take it as a range and show nothing of the track.
+    `origin` is the frame from which the record is counted. The EDL adapter stores a track's first
+    record timecode as a negative start. OpenTimelineIO would take it as a range and show nothing of
+    the track.
     """
     starts = [t.source_range.start_time for t in timeline.tracks if t.source_range is not None]
     if not starts:
@@ -145,4 +125,4 @@ def _rebase(timeline: Any, otio: Any) -> None:
             track.source_range = None
             if late.value > 0:
                 track.insert(0, otio.schema.Gap(duration=late))
-    timeline.global_start_time = otio.opentime.RationalTime(-first.value, first.rate)
+    timeline.global_start_time = otio.opentime.RationalTime(origin - first.value, first.rate)

@@ -8,7 +8,6 @@ several rates is off by a frame.
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Sequence
 from fractions import Fraction
@@ -17,7 +16,7 @@ from typing import Any
 from palette4d.common.errors import Palette4dError
 from palette4d.media.clip_base import as_rate
 from palette4d.media.timecode import nominal
-from palette4d.shows.edl_text import UNFOLLOWED
+from palette4d.shows.edl_motion import UNFOLLOWED
 from palette4d.shows.timeline_files import library
 
 #: Part of a frame within which two times are the same: files hold times as rounded decimals.
@@ -54,13 +53,14 @@ class Shown:
 
     Attributes
     ----------
-    record : the clip's start in the time of the timeline's stack, in seconds.
+    record : the clip's start in the time of the timeline's stack, in seconds; None if it is not
+        known, because an item before it has no length.
     start, end : the media's time in seconds. At the media's own speed `end` is behind the last
         frame, else it is a time in the last frame.
     speed : how often the media's own speed; negative if it plays backwards, 0 if it stands still.
     """
 
-    record: Fraction
+    record: Fraction | None
     start: Fraction
     end: Fraction
     speed: float = 1.0
@@ -103,19 +103,21 @@ def shown(levels: Sequence[Level], rate: Fraction) -> Shown | None:
     schema = library().schema
     clip = levels[0].item
     whole = window = _visible(clip)
-    for level, parent in itertools.pairwise([*levels, Level(levels[-1].item.parent(), "")]):
-        item = level.item
-        if item is not clip and any(
-            isinstance(effect, schema.TimeEffect) for effect in item.effects
-        ):
+    for level in levels[1:]:
+        if any(isinstance(effect, schema.TimeEffect) for effect in level.item.effects):
             raise Palette4dError(
-                f"the clip {clip.name!r} lies in a compound {item.name!r} that plays at "
+                f"the clip {clip.name!r} lies in a compound {level.item.name!r} that plays at "
                 "another speed, which is not followed; change the speed of the clip itself"
             )
+    parents = [*(level.item for level in levels[1:]), levels[-1].item.parent()]
+    lost = any(isinstance(level.place, str) for level in levels)
+    if lost and all(parent.source_range is None for parent in parents):
+        return _with_speed(clip, None, whole, rate)  # nothing cuts it, wherever it is
+    for level, parent in zip(levels, parents, strict=True):
         own, place = level.moves
         window = _moved(window, place - own)
-        if parent.item.source_range is not None:
-            cut = _common(window, _bounds(parent.item.source_range))
+        if parent.source_range is not None:
+            cut = _common(window, _bounds(parent.source_range))
             if cut is None:
                 return None
             window = cut
@@ -178,7 +180,7 @@ def speed_of(clip: Any) -> float:
     return speed
 
 
-def _with_speed(clip: Any, record: Fraction, left: _Range, rate: Fraction) -> Shown:
+def _with_speed(clip: Any, record: Fraction | None, left: _Range, rate: Fraction) -> Shown:
     """Return the media that a clip plays in a range of its own time.
 
     At another speed the in-point stays, and the media of the clip's length times the speed follows

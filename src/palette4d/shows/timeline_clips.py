@@ -11,15 +11,18 @@ import dataclasses
 import math
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.text import counted
+from palette4d.media.timecode import label_of, nominal
 from palette4d.shows import media_range, timeline_files
 from palette4d.shows.edl_cdl import Cdl
+from palette4d.shows.edl_items import NAMESPACE
 from palette4d.shows.media_range import Level, Shown, own_rate, rate_of, seconds
 from palette4d.shows.shots import Place
 
+Of = TypeVar("Of")
 #: The most compounds inside of each other.
 DEEPEST = 64
 NOTHING = Shown(Fraction(0), Fraction(0), Fraction(0))
@@ -44,6 +47,7 @@ class EditClip:
         say them.
     by_frames : whether the edit's times are frames of the media, whatever its files' rate, as
         in an EDL.
+    drops : whether the timecodes of an EDL leave numbers out; None if nothing says so.
     cdl : its CDL.
     start_frame : the number of the image sequence's first file.
     problem : the reason why its times or names cannot be used, or "".
@@ -59,6 +63,7 @@ class EditClip:
     begins: Fraction | None = None
     length: int | None = None
     by_frames: bool = False
+    drops: bool | None = None
     cdl: Cdl | None = None
     start_frame: int = 0
     problem: str = ""
@@ -206,26 +211,31 @@ class _Walk:
             place=place,
             url=url,
             pattern=pattern,
-            reel=_reel(clip),
+            reel=_stated(clip, "reel", str) or "",
             shown=shown,
             rate=rate,
             begins=None if known is None else seconds(known.start_time),
             length=None if known is None else round(seconds(known.duration) * rate),
             by_frames=timeline_files.is_edl(self.path),
+            drops=_stated(clip, "drop_frame", bool),
             cdl=Cdl.of_metadata(clip.metadata.get("cdl")),
             start_frame=reference.start_frame if numbered else 0,
         )
 
-    def record_of(self, time: Fraction) -> str:
-        """Return a time of the timeline as a timecode, else as a frame number."""
+    def record_of(self, time: Fraction | None) -> str:
+        """Return a time of the timeline as a timecode, else as a frame number; "" for no time."""
+        if time is None:
+            return ""
         opentime, start = self.otio.opentime, self.timeline.global_start_time
-        rate = float(self.rate)
         at = (time + (seconds(start) if start else 0)) * self.rate
         frame = math.floor(at + media_range.ROUNDING)
-        try:
-            return str(opentime.to_timecode(opentime.RationalTime(frame, rate), rate))
-        except ValueError:  # a rate that timecodes do not have, or before 0
+        known = opentime.RationalTime.is_smpte_timecode_rate(float(self.rate))
+        if not known or frame < 0:
             return f"{float(at):g}"
+        drops = _stated(self.timeline, "drop_frame", bool)
+        if drops is None:
+            drops = self.rate.denominator == 1001 and nominal(self.rate) % 30 == 0
+        return label_of(frame, self.rate, drops)
 
 
 def _end(place: Fraction | str, item: Any) -> Fraction | str:
@@ -236,15 +246,19 @@ def _end(place: Fraction | str, item: Any) -> Fraction | str:
         return place + seconds(item.duration())
     except Exception:  # an item without any range, or times that cannot be: each type has its own
         kind = type(item).__name__.lower()
-        return f"a {kind} before it has no length, expected one; set its source_range"
+        return (
+            f"its place in the edit is not known, because a {kind} before it has no length; "
+            "expected one, set its source_range"
+        )
 
 
-def _reel(clip: Any) -> str:
+def _stated(item: Any, name: str, kind: type[Of]) -> Of | None:
+    """Return what the EDL's adapter, or ours, says of a clip or a timeline; None if nothing."""
     try:
-        reel = clip.metadata["cmx_3600"]["reel"]
+        found = item.metadata[NAMESPACE][name]
     except (KeyError, TypeError):
-        return ""
-    return reel if isinstance(reel, str) else ""
+        return None
+    return found if isinstance(found, kind) else None
 
 
 def _first_rate(timeline: Any) -> Fraction:

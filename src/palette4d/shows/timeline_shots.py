@@ -10,6 +10,7 @@ import dataclasses
 import functools
 from fractions import Fraction
 from pathlib import Path
+from typing import Literal
 
 from palette4d import _core
 from palette4d.common.child import Child, ChildError
@@ -18,7 +19,15 @@ from palette4d.common.text import file_safe
 from palette4d.media import clip_sequence
 from palette4d.media.clip import Clip, open_clip
 from palette4d.media.clip_base import describe
-from palette4d.media.timecode import frames_of, nominal, start_timecode
+from palette4d.media.timecode import (
+    day_of,
+    drops_numbers,
+    frames_of,
+    label_of,
+    nearest,
+    nominal,
+    start_timecode,
+)
 from palette4d.shows import find_media
 from palette4d.shows.shots import Shot
 from palette4d.shows.timeline_clips import EditClip, EditList
@@ -48,18 +57,25 @@ class Media:
         return self.last - self.first + 1
 
 
+Conform = Literal["by-rates", "frame-for-frame"]
+
+
 def shots_of(
-    edit: EditList, folder: find_media.Folder | None = None, handles: int = 0
+    edit: EditList,
+    folder: find_media.Folder | None = None,
+    handles: int = 0,
+    conform: Conform | None = None,
 ) -> tuple[list[Shot], list[str]]:
     """Return the shots of an edit, and notes on how they were counted.
 
     `Shot.problem` says if the media is missing or unusable.
 
     Media is looked for in `folder`, then beside the timeline. `handles` is the number of head and
-    of tail frames; there are fewer where the media ends.
+    of tail frames; there are fewer where the media ends. `conform` says how the edit plays movies
+    of another rate; see `_Finder.counted`.
     """
     with Child(SECONDS, MEGABYTES) as child:
-        finder = _Finder(edit.path, folder, handles, child)
+        finder = _Finder(edit.path, folder, handles, child, conform)
         shots = [finder.shot(clip) for clip in edit.clips]
         return shots, list(dict.fromkeys(finder.notes))
 
@@ -68,9 +84,15 @@ class _Finder:
     """Finds the media of clips, and their frames in it."""
 
     def __init__(
-        self, path: Path, folder: find_media.Folder | None, handles: int, child: Child
+        self,
+        path: Path,
+        folder: find_media.Folder | None,
+        handles: int,
+        child: Child,
+        conform: Conform | None,
     ) -> None:
         self.path, self.folder, self.handles, self.child = path, folder, handles, child
+        self.conform = conform
         self.media: dict[str, Media | str] = {}
         self.timecodes: dict[str, str | None] = {}
         self.notes: list[str] = []
@@ -162,17 +184,26 @@ class _Finder:
         """Return the rate that counts a clip's frames: the edit's, or that of the movie's file.
 
         23.976 and 24 count alike. An edit that has another rate for all of the movie's frames plays
-        them frame for frame; else its times are seconds.
+        them frame for frame; else its times are seconds. Timecodes of an EDL count frames of the
+        movie, or pairs of them (SMPTE ST 12-1) and so on, which are seconds, too.
         """
         if not media.is_movie or nominal(clip.rate) == nominal(media.rate):
             return clip.rate
         if not clip.by_frames:
-            return clip.rate if clip.length == media.count else media.rate
-        self.notes.append(
-            f"{spec} plays {float(media.rate):.6g} frames per second, the EDL's timecodes count "
-            f"{float(clip.rate):.6g}: they are taken as frames of the media. Check the shot"
-        )
-        return clip.rate
+            by_rates = clip.length != media.count
+        else:
+            by_rates = nominal(media.rate) % nominal(clip.rate) == 0
+        if self.conform is not None:
+            by_rates = self.conform == "by-rates"
+        elif clip.by_frames:
+            other = "frame-for-frame" if by_rates else "by-rates"
+            self.notes.append(
+                f"{spec} plays {float(media.rate):.6g} frames per second, the EDL's timecodes "
+                f"count {float(clip.rate):.6g}: they are taken as "
+                f"{'seconds' if by_rates else 'frames'} of the media. Check the shot; "
+                f"{Arg('conform', other)} takes them as {'frames' if by_rates else 'seconds'}"
+            )
+        return media.rate if by_rates else clip.rate
 
     def offset(
         self, clip: EditClip, spec: str, media: Media, rate: Fraction, shown: tuple[int, int]
@@ -183,16 +214,46 @@ class _Finder:
             return clip.start_frame - (begins or 0)
         if not media.is_movie and media.first <= shown[0] <= shown[1] <= media.last:
             return 0  # a sequence's numbers are the media's time
+        if begins is not None:
+            return media.first - begins
+        text = self.stated(spec)
+        if text is None:
+            return 0
+        begins = frames_of(text, rate)
         if begins is None:
-            begins = self.stated(spec, rate)
-        return 0 if begins is None else media.first - begins
+            raise Palette4dError(
+                f"{spec}: it begins at the timecode {text}, which {float(rate):.6g} frames per "
+                f"second do not have; check the edit's rate, or {Arg('conform')}"
+            )
+        drops = drops_numbers(text, rate)
+        first = shown[0]
+        if clip.drops is not None and clip.drops != drops:
+            first = self.renumbered(clip, spec, rate, first, drops)
+        if not 0 <= first - begins < media.count:  # past midnight
+            first = nearest(first, begins, day_of(rate, drops))
+        return media.first - begins + first - shown[0]
 
-    def stated(self, spec: str, rate: Fraction) -> int | None:
-        """Return the start timecode in a clip's files as a frame count."""
+    def renumbered(self, clip: EditClip, spec: str, rate: Fraction, frame: int, drops: bool) -> int:
+        """Count the timecode of an EDL's event as its media's timecodes count."""
+        label = label_of(frame, rate, bool(clip.drops))
+        found = frames_of(label.replace(";", ":"), rate, drops)
+        how = "leave numbers out" if drops else "leave no numbers out"
+        if found is None:
+            raise Palette4dError(
+                f"{spec}: found the source timecode {label}, which the media does not have: its "
+                f"timecodes {how} (drop-frame); mend FCM in the EDL"
+            )
+        self.notes.append(
+            f"{spec}: its timecodes {how}, those of the EDL differ; events are found by the "
+            "timecode that they state"
+        )
+        return found
+
+    def stated(self, spec: str) -> str | None:
+        """Return the start timecode in a clip's files."""
         if spec not in self.timecodes:
             self.timecodes[spec] = self.child.call(_timecode, spec)
-        text = self.timecodes[spec]
-        return None if text is None else frames_of(text, rate)
+        return self.timecodes[spec]
 
 
 def _name(clip: str) -> str:
