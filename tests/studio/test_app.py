@@ -59,17 +59,6 @@ def test_without_a_screen_it_says_how_to_do_without(sidecar: Path, tmp_path: Pat
     assert "--screenshot" in done.stderr
 
 
-def test_a_library_that_qt_would_abort_without_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    def missing(name: str) -> None:
-        raise OSError(name)
-
-    monkeypatch.setattr(app.ctypes, "CDLL", missing)
-    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    assert app.missing_library() is None  # without a screen
-    monkeypatch.setenv("QT_QPA_PLATFORM", "xcb")
-    assert app.missing_library() == "libxcb-cursor.so.0"
-
-
 def brought_forward(sidecar: Path, qtbot: Any) -> bool:
     """Whether another program finds this window, which answers meanwhile."""
     program = (

@@ -1,7 +1,6 @@
 """Starting the window, with or without a screen."""
 
 import contextlib
-import ctypes
 import functools
 import os
 import re
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from palette4d.common.errors import Palette4dError, WriteError
 from palette4d.common.files import replacing
-from palette4d.studio import texts
+from palette4d.studio import libraries, texts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,8 +28,6 @@ if TYPE_CHECKING:
 USUAL_SIZE = (1600, 1000)
 #: What the rims and the title of a window take, at most.
 RIMS = (16, 48)
-#: Qt loads it for each window on an X screen since 6.5; many desktops lack it.
-XCB_CURSOR = "libxcb-cursor.so.0"
 #: Seconds after which a screenshot is taken even if something is still being computed.
 LONGEST_WAIT = 60.0
 
@@ -59,17 +56,6 @@ def answers(display: str) -> bool:
             found.connect(place)
             return True
     return False
-
-
-def missing_library() -> str | None:
-    """Return a library that Qt needs for an X screen, where it would abort without; or None."""
-    wanted = os.environ.get("QT_QPA_PLATFORM", "xcb")
-    if sys.platform.startswith("linux") and wanted == "xcb" and not os.getenv("WAYLAND_DISPLAY"):
-        try:
-            ctypes.CDLL(XCB_CURSOR)
-        except OSError:
-            return XCB_CURSOR
-    return None
 
 
 def run(
@@ -112,11 +98,8 @@ def run(
             "expected one for the window. `palette4d studio PATH --screenshot OUT.png` draws it "
             "without a screen; for the window itself use a remote screen (ssh -X, VNC)"
         )
-    elif (library := missing_library()) is not None:
-        raise Palette4dError(
-            f"found no {library}, which Qt needs for a window; install it (Debian, Ubuntu: "
-            "libxcb-cursor0; Fedora, Rocky: xcb-util-cursor)"
-        )
+    if lacking := libraries.missing():
+        raise Palette4dError(libraries.advice(lacking))
     from PySide6.QtCore import QSettings, QSize, Qt, QTemporaryDir
     from PySide6.QtWidgets import QApplication
 
