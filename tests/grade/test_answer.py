@@ -77,6 +77,40 @@ def test_a_pick_that_floods_is_warned_of(monkeypatch: pytest.MonkeyPatch) -> Non
     assert not answer(document_of(monkeypatch, wall)).floods
 
 
+@pytest.mark.parametrize(("columns", "proposed"), [(2, True), (6, False)])
+def test_a_proposed_hold_costs_the_thing_little(
+    monkeypatch: pytest.MonkeyPatch, columns: int, proposed: bool
+) -> None:
+    """Some of the thing's 40 columns have the other thing's colour, which the hold keeps."""
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = RED
+    picture[30:90, 140:180] = picture[30:90, 60 - columns : 60] = RUST
+    document = document_of(monkeypatch, picture)
+    document.pick(0, pixel=(30.0, 60.0), box=9, to="#2040b0", reach=8)
+    found = document.answer("p1")
+    assert found is not None
+    assert found.other is not None
+    assert (found.hold is not None) == proposed
+
+
+@pytest.mark.parametrize("borders", [2, 3])
+def test_a_region_along_three_borders_may_be_too_much(
+    monkeypatch: pytest.MonkeyPatch, borders: int
+) -> None:
+    """A fifth of it is far from the picked colour: too much of a large region alone."""
+    y, x = np.mgrid[:H, :W]
+    part = np.where(x < 20, y, np.where(y >= H - 20, H + x, np.nan))
+    if borders == 3:
+        part = np.where((x >= W - 20) & (y < H - 20), H + W + H - y, part)
+    region = np.isfinite(part)
+    picture = np.tile(GREY, (H, W, 1))
+    along = (part[region] / np.nanmax(part))[:, None]
+    picture[region] = (1 - along) * RED + along * np.array([0.5, 0.36, 0.3])
+    found = answer(document_of(monkeypatch, picture), (10.0, 20.0))
+    assert found.share < 0.4
+    assert found.floods == (borders == 3)
+
+
 def test_a_hold_has_a_share_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     picture = np.tile(GREY, (H, W, 1))
     picture[30:90, 20:60] = RED

@@ -10,8 +10,11 @@ import pytest
 from palette4d.colour.encoding_conversion import between
 from palette4d.common.errors import Palette4dError
 from palette4d.grade import sidecar
+from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.copying import Fit
 from palette4d.grade.document import Document
+from palette4d.grade.picks import Pick
+from palette4d.media.array_clip import ArrayClip
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "sidecars"
 
@@ -280,3 +283,19 @@ def test_picks_are_copied() -> None:
     still.copy_from(source, time=8)
     (pick,) = still.grade.picks
     assert (pick.start, pick.until) == (None, None)
+
+
+@pytest.mark.parametrize(("side", "there"), [(3, False), (4, True)])
+def test_a_few_pixels_of_a_colour_are_no_thing(
+    monkeypatch: pytest.MonkeyPatch, side: int, there: bool
+) -> None:
+    """Of a frame of 200 x 100 pixels, a connected region of ten is needed."""
+    frames = np.full((2, 100, 200, 3), 0.5, np.float32)
+    frames[:, 40 : 40 + side, 60 : 60 + side] = (0.8, 0.2, 0.1)
+    monkeypatch.setattr("palette4d.grade.clip_of_picks.find_clip", lambda *_: ArrayClip(frames))
+    fields = {"size": (200, 100), "frames": {"first": 0, "last": 1, "step": 1}}
+    pick = Pick("p1", "pick", 9, (0.8, 0.2, 0.1), to=(0.1, 0.2, 0.8))
+    found = ClipOfPicks(fields, None, None).at_home(pick, None)
+    assert (found is not None) == there
+    if found is not None:
+        assert (found.frame, found.rgb) == (1, pytest.approx(pick.rgb, abs=1e-6))

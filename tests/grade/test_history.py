@@ -111,9 +111,9 @@ def test_the_history_stays_small(plain: Path) -> None:
     assert plain.stat().st_size < 60_000
     last = [document.grade.colour(f"v{i}") for i in range(1, 6)]
     document = Document.load(plain)
-    while document.history.done:
+    for _ in range(200):
         document.undo()
-    assert not document.grade.settings
+    assert document.grade.colour("v5")[0] == 499 / 1000  # the oldest steps are forgotten
     while document.history.undone:
         document.redo()
     assert [document.grade.colour(f"v{i}") for i in range(1, 6)] == last
@@ -386,12 +386,8 @@ def test_undo_beside_another_writer(plain: Path) -> None:
     mine.save()
     found = Document.load(plain)
     assert set(found.grade.settings) == {"v2", "v3"}
-    assert [step.label for step in found.history.done] == [
-        "set v1 to 1 0 0",
-        "set v2 to 0 1 0",
-        "undo: set v1 to 1 0 0",
-        "set v3 to 0 0 1",
-    ]
+    labels = [step.label for step in found.history.done]
+    assert labels == ["set v1 to 1 0 0", "set v2 to 0 1 0", "edits of two programs"]
     for _ in found.history.done:
         found.undo()
     assert not found.grade.settings

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "model/sidecar_error.hpp"
 #include "model/vec3.hpp"
 
 namespace palette4d {
@@ -123,7 +124,8 @@ public:
 private:
     [[noreturn]] void fail(const std::string& member, double found,
                            const std::string& expected) const {
-        throw ConversionProblem(step_, member, "the number " + text_of(found), expected);
+        throw SidecarError("", '/' + std::to_string(step_) + member, "the number " + text_of(found),
+                           expected);
     }
     void positive(double value, const std::string& member) const {
         if (!(value > 0)) fail(member, value, "a number above 0");
@@ -141,15 +143,6 @@ private:
 };
 
 }  // namespace
-
-ConversionProblem::ConversionProblem(std::size_t step, std::string member, std::string found,
-                                     std::string expected)
-    : std::invalid_argument("conversion: step " + std::to_string(step) + member + ": found " +
-                            found + ", expected " + expected),
-      step_(step),
-      member_(std::move(member)),
-      found_(std::move(found)),
-      expected_(std::move(expected)) {}
 
 double ColourConversion::log_forward(const LogStep& s, const Prepared& at, std::size_t c,
                                      double x) {
@@ -200,8 +193,9 @@ ColourConversion::ColourConversion(std::vector<ConversionStep> steps) : steps_(s
         Prepared prepared;
         if (const auto* matrix = std::get_if<MatrixStep>(&steps_[i])) {
             if (!inverted(*matrix, prepared.inverse)) {
-                throw ConversionProblem(i, "/matrix", "a matrix without an inverse",
-                                        "one whose rows do not depend on each other");
+                throw SidecarError("", '/' + std::to_string(i) + "/matrix",
+                                   "a matrix without an inverse",
+                                   "one whose rows do not depend on each other");
             }
         } else if (const auto* log = std::get_if<LogStep>(&steps_[i])) {
             for (std::size_t c = 0; c < 3; ++c) {

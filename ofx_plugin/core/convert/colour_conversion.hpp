@@ -4,8 +4,6 @@
 
 #include <array>
 #include <cstddef>
-#include <stdexcept>
-#include <string>
 #include <variant>
 #include <vector>
 
@@ -47,26 +45,11 @@ struct CurveStep {
 
 using ConversionStep = std::variant<MatrixStep, LogStep, GammaStep, CurveStep>;
 
-/// A step that is not invertible or not a curve: which member, what was found and expected.
-class ConversionProblem : public std::invalid_argument {
-public:
-    ConversionProblem(std::size_t step, std::string member, std::string found,
-                      std::string expected);
-    std::size_t step() const { return step_; }
-    const std::string& member() const { return member_; }
-    const std::string& found() const { return found_; }
-    const std::string& expected() const { return expected_; }
-
-private:
-    std::size_t step_;
-    std::string member_, found_, expected_;
-};
-
 /// The chain of steps; continuous, invertible, defined for every number. Immutable.
 class ColourConversion {
 public:
     ColourConversion() = default;  ///< the identity
-    /// Throws ConversionProblem.
+    /// Throws SidecarError (without a file) for a step that is not invertible or not a curve.
     explicit ColourConversion(std::vector<ConversionStep> steps);
 
     const std::vector<ConversionStep>& steps() const { return steps_; }

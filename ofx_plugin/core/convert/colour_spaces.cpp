@@ -1,7 +1,7 @@
 #include "convert/colour_spaces.hpp"
 
-#include <array>
 #include <cctype>
+#include <sstream>
 
 namespace palette4d {
 namespace {
@@ -51,140 +51,76 @@ struct Space {
     Kind kind;
     bool core;
     const Gamut* gamut;
-    std::vector<const char*> aliases;
+    const char* aliases;  ///< with spaces between them
 };
 
-const std::vector<Space>& spaces() {
-    using K = Kind;
-    static const std::vector<Space> all = {
-        {"srgb_display", K::kSdr, true, &kRec709, {"srgb", "srgb_rec709_display"}},
-        {"srgb_tx",
-         K::kSdr,
-         true,
-         &kRec709,
-         {"srgb_texture", "srgb_rec709_scene", "srgb_encoded_rec709_srgb"}},
-        {"rec1886_rec709_display",
-         K::kSdr,
-         true,
-         &kRec709,
-         {"rec709", "bt709", "rec1886", "bt1886", "g24_rec709_display"}},
-        {"g24_rec709_tx",
-         K::kSdr,
-         true,
-         &kRec709,
-         {"g24_rec709", "g24_rec709_scene", "gamma 2.4 rec709 texture",
-          "gamma 2.4 encoded rec709"}},
-        {"g22_rec709_tx",
-         K::kSdr,
-         true,
-         &kRec709,
-         {"g22_rec709", "g22_rec709_scene", "gamma 2.2 rec709 texture",
-          "gamma 2.2 encoded rec709"}},
-        {"g18_rec709_tx",
-         K::kSdr,
-         true,
-         &kRec709,
-         {"g18_rec709", "g18_rec709_scene", "gamma 1.8 rec709 texture",
-          "gamma 1.8 encoded rec709"}},
-        {"camera_rec709", K::kSdr, false, &kRec709, {"rec709_camera"}},
-        {"rec1886_rec2020_display", K::kSdr, true, &kRec2020, {"rec2020", "bt2020"}},
-        {"displayp3_display", K::kSdr, true, &kP3, {"displayp3", "p3display"}},
-        {"srgb_encoded_p3d65_tx",
-         K::kSdr,
-         true,
-         &kP3,
-         {"srgb_encoded_p3d65", "srgb_p3d65", "srgb_displayp3", "srgb_p3d65_scene",
-          "srgb_encoded_p3d65_texture"}},
-        {"p3d65_display",
-         K::kSdr,
-         true,
-         &kP3,
-         {"p3d65", "g26_p3d65_display", "gamma 2.6 p3d65 display"}},
-        {"p3d60_display", K::kSdr, false, &kP3D60, {}},
-        {"p3_dci_display", K::kSdr, false, &kP3Dci, {"dcip3", "p3dci"}},
-        {"srgb_encoded_ap1_tx",
-         K::kSdr,
-         true,
-         &kAp1,
-         {"srgb_encoded_ap1", "srgb_ap1", "srgb_ap1_scene", "srgb_encoded_ap1_texture"}},
-        {"g22_ap1_tx",
-         K::kSdr,
-         true,
-         &kAp1,
-         {"g22_ap1", "g22_ap1_scene", "gamma 2.2 ap1 texture", "gamma 2.2 encoded ap1"}},
-        {"rec2100_pq_display",
-         K::kHdr,
-         true,
-         &kRec2020,
-         {"rec2100pq", "pq", "st2084", "smpte2084"}},
-        {"rec2100_hlg_display", K::kHdr, true, &kRec2020, {"rec2100hlg", "hlg", "aribstdb67"}},
-        {"st2084_p3d65_display", K::kHdr, true, &kP3, {"pq_p3d65_display"}},
-        {"lin_rec709_srgb",
-         K::kLinear,
-         true,
-         &kRec709,
-         {"lin_rec709", "lin_srgb", "lin_rec709_scene"}},
-        {"lin_rec2020", K::kLinear, true, &kRec2020, {"lin_rec2020_scene"}},
-        {"lin_p3d65", K::kLinear, true, &kP3, {"lin_displayp3", "lin_p3d65_scene"}},
-        {"ACES2065-1", K::kLinear, true, &kAp0, {"aces", "lin_ap0", "lin_ap0_scene"}},
-        {"ACEScg", K::kLinear, true, &kAp1, {"lin_ap1", "lin_ap1_scene"}},
-        {"ACEScc", K::kLog, true, &kAp1, {"acescc_ap1", "acescc_ap1_scene"}},
-        {"ACEScct", K::kLog, true, &kAp1, {"acescct_ap1", "acescct_ap1_scene"}},
-        {"lin_arri_wide_gamut_3", K::kLinear, false, &kArri3, {"lin_alexawide", "lin_awg3"}},
-        {"arri_logc3_ei800",
-         K::kLog,
-         false,
-         &kArri3,
-         {"logc", "logc3", "arri logc", "arri logc3", "logc3ei800_alexawide"}},
-        {"lin_arri_wide_gamut_4", K::kLinear, false, &kArri4, {"lin_awg4"}},
-        {"arri_logc4", K::kLog, false, &kArri4, {"logc4"}},
-        {"lin_sgamut3", K::kLinear, false, &kSony, {}},
-        {"slog3_sgamut3", K::kLog, false, &kSony, {}},
-        {"lin_sgamut3cine", K::kLinear, false, &kSonyCine, {}},
-        {"slog3_sgamut3cine", K::kLog, false, &kSonyCine, {"slog3", "slog3_sgamutcine"}},
-        {"lin_venice_sgamut3", K::kLinear, false, &kVenice, {}},
-        {"slog3_venice_sgamut3", K::kLog, false, &kVenice, {}},
-        {"lin_venice_sgamut3cine", K::kLinear, false, &kVeniceCine, {}},
-        {"slog3_venice_sgamut3cine", K::kLog, false, &kVeniceCine, {"slog3_venice_sgamutcine"}},
-        {"lin_vgamut", K::kLinear, false, &kPanasonic, {}},
-        {"vlog_vgamut", K::kLog, false, &kPanasonic, {"vlog"}},
-        {"lin_redwidegamutrgb", K::kLinear, false, &kRed, {"lin_rwg"}},
-        {"log3g10_redwidegamutrgb", K::kLog, false, &kRed, {"log3g10", "rl3g10_rwg"}},
-        {"lin_davinci_widegamut", K::kLinear, false, &kDavinci, {}},
-        {"davinci_intermediate_widegamut",
-         K::kLog,
-         false,
-         &kDavinci,
-         {"davinci intermediate", "di wg"}},
-        {"lin_bmd_widegamut_gen5", K::kLinear, false, &kBlackmagic, {}},
-        {"bmdfilm_widegamut_gen5",
-         K::kLog,
-         false,
-         &kBlackmagic,
-         {"bmdfilm", "blackmagic film gen 5"}},
-        {"lin_cinemagamut_d55", K::kLinear, false, &kCanon, {"lin_canoncgamutday"}},
-        {"canonlog2_cinemagamut_d55",
-         K::kLog,
-         false,
-         &kCanon,
-         {"canonlog2", "clog2", "canonlog2_cgamutday"}},
-        {"canonlog3_cinemagamut_d55",
-         K::kLog,
-         false,
-         &kCanon,
-         {"canonlog3", "clog3", "canonlog3_cgamutday"}},
-        {"ADX10", K::kLog, false, &kRec709, {}},
-        {"ADX16", K::kLog, false, &kRec709, {}},
-        {nullptr, K::kLog, false, &kRec2020, {"apple log"}},
-        {nullptr, K::kLinear, false, &kAdobeRgb, {"lin_adobergb", "lin_adobergb_scene"}},
-        {nullptr,
-         K::kSdr,
-         false,
-         &kAdobeRgb,
-         {"adobergb", "g22_adobergb", "g22_encoded_adobergb", "gamma 2.2 encoded adobergb"}},
-    };
-    return all;
-}
+constexpr Space kSpaces[] = {
+    {"srgb_display", Kind::kSdr, true, &kRec709, "srgb srgb_rec709_display"},
+    {"srgb_tx", Kind::kSdr, true, &kRec709,
+     "srgb_texture srgb_rec709_scene srgb_encoded_rec709_srgb"},
+    {"rec1886_rec709_display", Kind::kSdr, true, &kRec709,
+     "rec709 bt709 rec1886 bt1886 g24_rec709_display"},
+    {"g24_rec709_tx", Kind::kSdr, true, &kRec709,
+     "g24_rec709 g24_rec709_scene gamma_2.4_rec709_texture gamma_2.4_encoded_rec709"},
+    {"g22_rec709_tx", Kind::kSdr, true, &kRec709,
+     "g22_rec709 g22_rec709_scene gamma_2.2_rec709_texture gamma_2.2_encoded_rec709"},
+    {"g18_rec709_tx", Kind::kSdr, true, &kRec709,
+     "g18_rec709 g18_rec709_scene gamma_1.8_rec709_texture gamma_1.8_encoded_rec709"},
+    {"camera_rec709", Kind::kSdr, false, &kRec709, "rec709_camera"},
+    {"rec1886_rec2020_display", Kind::kSdr, true, &kRec2020, "rec2020 bt2020"},
+    {"displayp3_display", Kind::kSdr, true, &kP3, "displayp3 p3display"},
+    {"srgb_encoded_p3d65_tx", Kind::kSdr, true, &kP3,
+     "srgb_encoded_p3d65 srgb_p3d65 srgb_displayp3 srgb_p3d65_scene srgb_encoded_p3d65_texture"},
+    {"p3d65_display", Kind::kSdr, true, &kP3, "p3d65 g26_p3d65_display gamma_2.6_p3d65_display"},
+    {"p3d60_display", Kind::kSdr, false, &kP3D60, ""},
+    {"p3_dci_display", Kind::kSdr, false, &kP3Dci, "dcip3 p3dci"},
+    {"srgb_encoded_ap1_tx", Kind::kSdr, true, &kAp1,
+     "srgb_encoded_ap1 srgb_ap1 srgb_ap1_scene srgb_encoded_ap1_texture"},
+    {"g22_ap1_tx", Kind::kSdr, true, &kAp1,
+     "g22_ap1 g22_ap1_scene gamma_2.2_ap1_texture gamma_2.2_encoded_ap1"},
+    {"rec2100_pq_display", Kind::kHdr, true, &kRec2020, "rec2100pq pq st2084 smpte2084"},
+    {"rec2100_hlg_display", Kind::kHdr, true, &kRec2020, "rec2100hlg hlg aribstdb67"},
+    {"st2084_p3d65_display", Kind::kHdr, true, &kP3, "pq_p3d65_display"},
+    {"lin_rec709_srgb", Kind::kLinear, true, &kRec709, "lin_rec709 lin_srgb lin_rec709_scene"},
+    {"lin_rec2020", Kind::kLinear, true, &kRec2020, "lin_rec2020_scene"},
+    {"lin_p3d65", Kind::kLinear, true, &kP3, "lin_displayp3 lin_p3d65_scene"},
+    {"ACES2065-1", Kind::kLinear, true, &kAp0, "aces lin_ap0 lin_ap0_scene"},
+    {"ACEScg", Kind::kLinear, true, &kAp1, "lin_ap1 lin_ap1_scene"},
+    {"ACEScc", Kind::kLog, true, &kAp1, "acescc_ap1 acescc_ap1_scene"},
+    {"ACEScct", Kind::kLog, true, &kAp1, "acescct_ap1 acescct_ap1_scene"},
+    {"lin_arri_wide_gamut_3", Kind::kLinear, false, &kArri3, "lin_alexawide lin_awg3"},
+    {"arri_logc3_ei800", Kind::kLog, false, &kArri3,
+     "logc logc3 arri_logc arri_logc3 logc3ei800_alexawide"},
+    {"lin_arri_wide_gamut_4", Kind::kLinear, false, &kArri4, "lin_awg4"},
+    {"arri_logc4", Kind::kLog, false, &kArri4, "logc4"},
+    {"lin_sgamut3", Kind::kLinear, false, &kSony, ""},
+    {"slog3_sgamut3", Kind::kLog, false, &kSony, ""},
+    {"lin_sgamut3cine", Kind::kLinear, false, &kSonyCine, ""},
+    {"slog3_sgamut3cine", Kind::kLog, false, &kSonyCine, "slog3 slog3_sgamutcine"},
+    {"lin_venice_sgamut3", Kind::kLinear, false, &kVenice, ""},
+    {"slog3_venice_sgamut3", Kind::kLog, false, &kVenice, ""},
+    {"lin_venice_sgamut3cine", Kind::kLinear, false, &kVeniceCine, ""},
+    {"slog3_venice_sgamut3cine", Kind::kLog, false, &kVeniceCine, "slog3_venice_sgamutcine"},
+    {"lin_vgamut", Kind::kLinear, false, &kPanasonic, ""},
+    {"vlog_vgamut", Kind::kLog, false, &kPanasonic, "vlog"},
+    {"lin_redwidegamutrgb", Kind::kLinear, false, &kRed, "lin_rwg"},
+    {"log3g10_redwidegamutrgb", Kind::kLog, false, &kRed, "log3g10 rl3g10_rwg"},
+    {"lin_davinci_widegamut", Kind::kLinear, false, &kDavinci, ""},
+    {"davinci_intermediate_widegamut", Kind::kLog, false, &kDavinci, "davinci_intermediate di_wg"},
+    {"lin_bmd_widegamut_gen5", Kind::kLinear, false, &kBlackmagic, ""},
+    {"bmdfilm_widegamut_gen5", Kind::kLog, false, &kBlackmagic, "bmdfilm blackmagic_film_gen_5"},
+    {"lin_cinemagamut_d55", Kind::kLinear, false, &kCanon, "lin_canoncgamutday"},
+    {"canonlog2_cinemagamut_d55", Kind::kLog, false, &kCanon,
+     "canonlog2 clog2 canonlog2_cgamutday"},
+    {"canonlog3_cinemagamut_d55", Kind::kLog, false, &kCanon,
+     "canonlog3 clog3 canonlog3_cgamutday"},
+    {"ADX10", Kind::kLog, false, &kRec709, ""},
+    {"ADX16", Kind::kLog, false, &kRec709, ""},
+    {nullptr, Kind::kLog, false, &kRec2020, "apple_log"},
+    {nullptr, Kind::kLinear, false, &kAdobeRgb, "lin_adobergb lin_adobergb_scene"},
+    {nullptr, Kind::kSdr, false, &kAdobeRgb,
+     "adobergb g22_adobergb g22_encoded_adobergb gamma_2.2_encoded_adobergb"},
+};
 
 /// Only letters and digits, in lower case, with "linear" shortened to "lin": "Linear Rec. 709",
 /// "lin_rec709" and "LIN REC-709" match.
@@ -203,10 +139,12 @@ std::string plain(const std::string& text) {
 
 const Space* space_of(const std::string& encoding) {
     const std::string wanted = plain(encoding);
-    for (const Space& space : spaces()) {
-        bool same = space.name && plain(space.name) == wanted;
-        for (const char* alias : space.aliases) same = same || plain(alias) == wanted;
-        if (same) return &space;
+    for (const Space& space : kSpaces) {
+        std::istringstream names(space.name ? space.name + (' ' + std::string(space.aliases))
+                                            : space.aliases);
+        for (std::string name; names >> name;) {
+            if (plain(name) == wanted) return &space;
+        }
     }
     return nullptr;
 }
@@ -253,7 +191,7 @@ std::shared_ptr<const ColourConversion> from_linear(const std::string& encoding)
         return std::make_shared<const ColourConversion>();
     }
     if (!space || space->kind != Kind::kSdr) return nullptr;
-    const std::string name = space->name ? space->name : space->aliases.front();
+    const std::string name = space->name ? space->name : space->aliases;
     const auto starts = [&](const char* with) { return name.rfind(with, 0) == 0; };
     // IEC 61966-2-1, ITU-R BT.709, BT.1886 and SMPTE RP 431-2.
     double gamma = 2.2, offset = 0;

@@ -134,19 +134,6 @@ void draw_matte(const Pixels& pixels, const Drawing& drawing) {
     }
 }
 
-const float* pixel_row(const ConstImageView& view, int y) {
-    return reinterpret_cast<const float*>(reinterpret_cast<const char*>(view.data) +
-                                          view.row_bytes * y);
-}
-float* pixel_row(const ImageView& view, int y) {
-    return reinterpret_cast<float*>(reinterpret_cast<char*>(view.data) + view.row_bytes * y);
-}
-
-void copy_pixels(const ConstImageView& in, const ImageView& out) {
-    const auto row = static_cast<std::size_t>(in.width) * static_cast<std::size_t>(in.channels);
-    for (int y = 0; y < in.height; ++y) std::copy_n(pixel_row(in, y), row, pixel_row(out, y));
-}
-
 /// What draw_cleaned() and draw_converted() take of the unfiltered displacement of picks: the edit
 /// has all of it where the palette moves, and is not drawn where only picks move colours.
 double own_share(const Drawing& drawing) {
@@ -184,18 +171,18 @@ void draw_cleaned(const ConstImageView& in, const ImageView& out, bool premultip
         options.premultiplied = premultiplied;
         drawing.edit->apply(in, out, options);
     } else {
-        copy_pixels(in, out);
+        copy_rows(in, out);
     }
     const double own = own_share(drawing);
     const auto strength = static_cast<float>(drawing.options.strength);
     std::vector<float> change(static_cast<std::size_t>(in.width) * 3);
     for (int y = 0; y < in.height; ++y) {
-        const float* const from = pixel_row(in, y);
+        const float* const from = in.row(y);
         if (!drawing.clean_up->change(from, place.x, place.y + place.step * y, in.width, own,
                                       change.data())) {
             continue;
         }
-        add_steps(change, premultiplied, strength, in.channels, pixel_row(out, y));
+        add_steps(change, premultiplied, strength, in.channels, out.row(y));
     }
 }
 
@@ -210,9 +197,9 @@ void draw_converted(const ConstImageView& in, const ImageView& out, bool premult
     std::vector<float> change(width * 3), before(width * 3), after(width * 3);
     RecolourOptions options;
     options.strength = strength;
-    copy_pixels(in, out);
+    copy_rows(in, out);
     for (int y = 0; y < in.height; ++y) {
-        const float* const from = pixel_row(in, y);
+        const float* const from = in.row(y);
         const bool cleaned = drawing.clean_up->change(from, place.x, place.y + place.step * y,
                                                       in.width, own, change.data());
         if (!cleaned && !drawing.edit->palette_moves()) continue;
@@ -224,7 +211,7 @@ void draw_converted(const ConstImageView& in, const ImageView& out, bool premult
             drawing.edit->apply({before.data(), in.width, 1, 3, 0},
                                 {after.data(), in.width, 1, 3, 0}, options);
         }
-        float* to = pixel_row(out, y);
+        float* to = out.row(y);
         for (std::size_t i = 0; i < width; ++i, to += channels) {
             const float* const pixel = from + i * channels;
             if (!recolourable(pixel, premultiplied) || !finite_pixel(&before[3 * i])) continue;
@@ -271,7 +258,7 @@ void draw_edit(const ConstImageView& in, const ImageView& out, bool premultiplie
         return;
     }
     if (!drawing.edit) {
-        if (in.data != out.data) copy_pixels(in, out);
+        copy_rows(in, out);
         return;
     }
     RecolourOptions options;
@@ -343,9 +330,7 @@ void draw_picture(const ConstImageView& in, const ImageView& out, Drawing drawin
     drawing.picture = {0, 0, in.width, in.height};
     if (row == 0) return;
     const bool packed = in.row_bytes == row_bytes && out.row_bytes == row_bytes;
-    const auto row_at = [&](int y) {
-        return pixel_row(in, in.height - 1 - y);
-    };  // y counts upwards
+    const auto row_at = [&](int y) { return in.row(in.height - 1 - y); };  // y counts upwards
     if (const auto clean_up = make_clean_up(drawing, {in.channels, premultiplied},
                                             {drawing.picture, drawing.picture, drawing.picture,
                                              clean_up_cell(1), clean_up_cell(1)})) {
@@ -365,8 +350,8 @@ void draw_picture(const ConstImageView& in, const ImageView& out, Drawing drawin
     share_rows(bands, threads, [&](const NextRow& next) {
         for (int band = next(); band >= 0; band = next()) {
             const int first = band * at_once, last = std::min(first + at_once, in.height);
-            const float* const from = pixel_row(in, first);
-            float* const to = pixel_row(out, first);
+            const float* const from = in.row(first);
+            float* const to = out.row(first);
             const std::size_t count =
                 static_cast<std::size_t>(last - first) * static_cast<std::size_t>(in.width);
             draw_pixels({from,

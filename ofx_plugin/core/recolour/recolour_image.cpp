@@ -60,22 +60,6 @@ void check_recolouring(const ConstImageView& in, const ImageView& out,
     resolved(options.instructions);
 }
 
-const float* row_of(const ConstImageView& view, int y) {
-    return reinterpret_cast<const float*>(reinterpret_cast<const char*>(view.data) +
-                                          view.row_bytes * y);
-}
-float* row_of(const ImageView& view, int y) {
-    return reinterpret_cast<float*>(reinterpret_cast<char*>(view.data) + view.row_bytes * y);
-}
-
-void copy_rows(const ConstImageView& in, const ImageView& out) {
-    const std::size_t bytes =
-        sizeof(float) * static_cast<std::size_t>(in.width) * static_cast<std::size_t>(in.channels);
-    for (int y = 0; y < in.height; ++y) {
-        if (row_of(in, y) != row_of(out, y)) std::memmove(row_of(out, y), row_of(in, y), bytes);
-    }
-}
-
 /// Rows whose code values differ from the palette's: pixels are collected, converted, and
 /// recoloured as one row.
 class ConvertedRows : public RowWorker {
@@ -159,6 +143,14 @@ private:
 
 }  // namespace
 
+void copy_rows(const ConstImageView& in, const ImageView& out) {
+    const std::size_t bytes =
+        sizeof(float) * static_cast<std::size_t>(in.width) * static_cast<std::size_t>(in.channels);
+    for (int y = 0; y < in.height; ++y) {
+        if (out.row(y) != in.row(y)) std::memmove(out.row(y), in.row(y), bytes);
+    }
+}
+
 Vec3 straight_colour(const float* pixel, bool premultiplied) {
     const double alpha = premultiplied ? pixel[3] : 1.0;
     return {straight<double>(pixel[0], alpha), straight<double>(pixel[1], alpha),
@@ -182,7 +174,7 @@ RecolourCounts Recolourer::apply(const ConstImageView& in, const ImageView& out,
         const std::unique_ptr<RowWorker> rows =
             converts ? std::make_unique<ConvertedRows>(*this, options, in.channels)
                      : worker(options, in.channels);
-        for (int y = next(); y >= 0; y = next()) rows->row(row_of(in, y), row_of(out, y), in.width);
+        for (int y = next(); y >= 0; y = next()) rows->row(in.row(y), out.row(y), in.width);
         rows->finish();
         const std::lock_guard<std::mutex> lock(guard);
         counts += rows->counts();

@@ -12,16 +12,20 @@ namespace palette4d {
 
 /// A float32 image that the caller owns: `row_bytes` may be negative or padded, `channels` is 3 or
 /// 4, interleaved (the fourth is alpha and is copied).
-struct ConstImageView {
-    const float* data;
+template <class Number, class Byte>
+struct ImageOf {
+    Number* data;
     int width, height, channels;
     std::ptrdiff_t row_bytes;
+
+    Number* row(int y) const {
+        return reinterpret_cast<Number*>(reinterpret_cast<Byte*>(data) + row_bytes * y);
+    }
 };
-struct ImageView {
-    float* data;
-    int width, height, channels;
-    std::ptrdiff_t row_bytes;
-};
+using ConstImageView = ImageOf<const float, const char>;
+using ImageView = ImageOf<float, char>;
+
+void copy_rows(const ConstImageView& in, const ImageView& out);
 
 /// How exactly a colour's displacement is computed.
 enum class Precision {

@@ -3,8 +3,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "model/sidecar_error.hpp"
-
 namespace palette4d {
 namespace {
 
@@ -42,6 +40,10 @@ void Cursor::fail(const std::string& found, const std::string& expected) const {
 }
 
 void Cursor::wrong(const std::string& expected) const { fail(described(*value_), expected); }
+
+void Cursor::fail_inside(const SidecarError& problem) const {
+    throw SidecarError(*file_, pointer() + problem.pointer(), problem.found(), problem.expected());
+}
 
 void Cursor::limit(std::size_t count, std::size_t most, const std::string& of) const {
     if (count <= most) return;

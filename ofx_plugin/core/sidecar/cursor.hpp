@@ -8,6 +8,7 @@
 #include <string>
 
 #include "model/polytope.hpp"
+#include "model/sidecar_error.hpp"
 #include "sidecar/json_tree.hpp"
 
 namespace palette4d {
@@ -23,6 +24,8 @@ public:
 
     [[noreturn]] void fail(const std::string& found, const std::string& expected) const;
     [[noreturn]] void wrong(const std::string& expected) const;
+    /// Throws a problem whose pointer begins here.
+    [[noreturn]] void fail_inside(const SidecarError& problem) const;
     /// Refuses `count` things where more than `most` are one too many.
     void limit(std::size_t count, std::size_t most, const std::string& of) const;
 

@@ -14,9 +14,8 @@
 namespace palette4d {
 
 ClipInfo read_clip(const Cursor& clip);
-std::shared_ptr<const ClipConversion> read_conversion(const Cursor& where, const std::string& file);
-ColourConversion read_steps(const Cursor& steps, const std::string& file,
-                            const std::string& pointer);
+std::shared_ptr<const ClipConversion> read_conversion(const Cursor& where);
+ColourConversion read_steps(const Cursor& steps);
 
 /// An index that was looked up; refuses -1, an unknown id. `all`: "12 vertices".
 int known(const Cursor& where, int index, const char* kind, const std::string& all);
@@ -24,7 +23,7 @@ int known(const Cursor& where, int index, const char* kind, const std::string& a
 /// alone identifies a handle.
 void claim(std::set<std::string>& taken, const Cursor& id);
 
-Polytope read_polytope(const Cursor& where, const ClipInfo& clip, const std::string& file);
+Polytope read_polytope(const Cursor& where, const ClipInfo& clip);
 
 /// Mattes that `known` has with the same text are shared with it.
 PickMattes read_mattes(const Cursor& mattes, const PickMattes& known);

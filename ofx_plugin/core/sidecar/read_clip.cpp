@@ -49,25 +49,22 @@ ConversionStep read_step(const Cursor& step) {
 
 }  // namespace
 
-ColourConversion read_steps(const Cursor& steps, const std::string& file,
-                            const std::string& pointer) {
+ColourConversion read_steps(const Cursor& steps) {
     std::vector<ConversionStep> result;
     for (std::size_t i = 0; i < steps.size(); ++i) result.push_back(read_step(steps.element(i)));
     try {
         return ColourConversion(std::move(result));
-    } catch (const ConversionProblem& problem) {
-        throw SidecarError(file, pointer + '/' + std::to_string(problem.step()) + problem.member(),
-                           problem.found(), problem.expected());
+    } catch (const SidecarError& problem) {
+        steps.fail_inside(problem);
     }
 }
 
-std::shared_ptr<const ClipConversion> read_conversion(const Cursor& where,
-                                                      const std::string& file) {
+std::shared_ptr<const ClipConversion> read_conversion(const Cursor& where) {
     auto result = std::make_shared<ClipConversion>();
     result->input_space = where.member("input_space").text();
     result->config = where.member("config").text();
     result->error = where.member("error").number();
-    result->steps = read_steps(where.member("steps"), file, "/clip/conversion/steps");
+    result->steps = read_steps(where.member("steps"));
     return result;
 }
 

@@ -54,7 +54,7 @@ void claim(std::set<std::string>& taken, const Cursor& id) {
     }
 }
 
-Polytope read_polytope(const Cursor& where, const ClipInfo& clip, const std::string& file) {
+Polytope read_polytope(const Cursor& where, const ClipInfo& clip) {
     Ids ids;
     std::vector<Vertex> vertices;
     const Cursor vertex_list = where.member("vertices");
@@ -102,8 +102,7 @@ Polytope read_polytope(const Cursor& where, const ClipInfo& clip, const std::str
     try {
         return Polytope(std::move(vertices), std::move(edges), std::move(sections));
     } catch (const SidecarError& problem) {
-        throw SidecarError(file, "/polytope" + problem.pointer(), problem.found(),
-                           problem.expected());
+        where.fail_inside(problem);
     }
 }
 

@@ -36,9 +36,9 @@ Sidecar sidecar_of(const Json& members, const std::string& name) {
     const Cursor clip = root.member("clip");
     sidecar.clip = read_clip(clip);
     if (clip.has("conversion")) {
-        sidecar.conversion = read_conversion(clip.member("conversion"), name);
+        sidecar.conversion = read_conversion(clip.member("conversion"));
     }
-    sidecar.polytope = read_polytope(root.member("polytope"), sidecar.clip, name);
+    sidecar.polytope = read_polytope(root.member("polytope"), sidecar.clip);
     PickMattes& mattes = sidecar.mattes;
     if (root.has("mattes")) mattes = read_mattes(root.member("mattes"), {});
     mattes.frame_step = static_cast<double>(sidecar.clip.step);
@@ -73,7 +73,7 @@ ColourConversion parse_conversion(const std::string& text, const std::string& na
     const Cursor steps(tree, name);
     const Schema& clip = sidecar_schema().member("clip");
     check(steps, clip.member("conversion").member("steps"), kSidecarVersion);
-    return read_steps(steps, name, "");
+    return read_steps(steps);
 }
 
 Sidecar read_sidecar(const std::string& path) {

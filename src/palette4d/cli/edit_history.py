@@ -32,8 +32,7 @@ def add_actions(action: Action) -> None:
     history = action(
         "history",
         "[--json | --clear]",
-        "list the steps that undo and redo know, oldest first. The sidecar keeps the last 200; "
-        "older steps are folded into one.",
+        "list the steps that undo and redo know, oldest first. The sidecar keeps the last 200.",
     )
     either = history.add_mutually_exclusive_group()
     either.add_argument("--json", action="store_true", help="print JSON")
@@ -105,12 +104,10 @@ def run_history(args: argparse.Namespace) -> int:
         labels = {"done": [s.label for s in done], "undone": [s.label for s in undone]}
         print(json.dumps(labels))
         return 0
-    number = 0
-    for step in (*done, *reversed(undone)):
-        number += step.steps
-        note = "" if number <= sum(s.steps for s in done) else "  (undone)"
+    for number, step in enumerate((*done, *reversed(undone)), 1):
+        note = "" if number <= len(done) else "  (undone)"
         print(f"{number:>4}  {step.label}{note}")
-    if not number:
+    if not done and not undone:
         print("no steps")
     return 0
 

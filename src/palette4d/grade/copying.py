@@ -21,6 +21,7 @@ from palette4d.grade import recolouring
 from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.edits import Colour, Key, Setting, as_colour, new_id
 from palette4d.grade.grade import Grade
+from palette4d.grade.keyframes import needed
 from palette4d.grade.pick_edits import taken
 from palette4d.grade.picks import Pick
 from palette4d.grade.versions import with_active_kept
@@ -240,32 +241,18 @@ def _handles(target: Grade, graded: Callable[[F64, float], F64]) -> Iterator[tup
                 before_at.setdefault(id_, []).append((float(at), colour, new))
     for edge in polytope["edges"]:
         samples = before_at.get(edge["id"], [])
-        ends = [(vertices[edge[end]]["frame"], shifts[edge[end]]) for end in ("from", "to")]
-        for index in _needed(ends, [(frame, new - old) for frame, old, new in samples]):
-            frame, _, new = samples[index]
+        ends = [vertices[edge[end]] for end in ("from", "to")]
+        times = [ends[0]["frame"], *(frame for frame, _, _ in samples), ends[1]["frame"]]
+        changes = [
+            shifts[edge["from"]],
+            *(new - old for _, old, new in samples),
+            shifts[edge["to"]],
+        ]
+        for index in needed(times, np.array(changes), (), TOLERANCE, MOST_STOPS)[1:-1]:
+            frame, _, new = samples[index - 1]
             id_ = new_id("s", taken)
             taken.add(id_)
             yield ("handle", id_), Setting(as_colour(new.tolist()), edge["id"], frame)
-
-
-def _needed(ends: list[tuple[float, F64]], samples: list[tuple[float, F64]]) -> list[int]:
-    """Return the samples that straight lines must pass to be near all samples."""
-    if not samples:
-        return []
-    frames = np.array([frame for frame, _ in samples])
-    wanted = np.array([shift for _, shift in samples])
-    chosen: list[int] = []
-    while len(chosen) < MOST_STOPS:
-        knots = sorted([*ends, *(samples[i] for i in chosen)], key=lambda knot: knot[0])
-        times = [frame for frame, _ in knots]
-        lines = np.column_stack(
-            [np.interp(frames, times, [shift[c] for _, shift in knots]) for c in range(3)]
-        )
-        off = np.abs(lines - wanted).max(axis=1)
-        if off.max() <= TOLERANCE:
-            break
-        chosen.append(int(off.argmax()))
-    return sorted(chosen)
 
 
 def _pick(match: Match, pick: Pick, into: Callable[[F64], F64] | None) -> Pick | None:

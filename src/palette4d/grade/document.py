@@ -601,7 +601,7 @@ class Document:
             if found != file.data:
                 theirs = _read(*sidecar.decoded(found, grade.name), self.path)
                 grade, history = merged(file, (grade, history), theirs)
-            history = replace(history, done=bounded(history.done))
+            history = replace(history, done=tuple(bounded(history.done)))
             members = grade.fields(history.done, history.undone)
             core, data = _core.encode_sidecar(members, str(target))
             sidecar.write(target, data, held, replaces=found)

@@ -13,7 +13,7 @@ Input and output are plain values: this module knows neither files nor palettes.
 """
 
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
@@ -136,13 +136,10 @@ class Edit:
         At most one for each key.
     label : str
         What the step does, for people: "set v14 to #e66b9e".
-    steps : int
-        The number of steps that this one stands for; more than 1 after `folded`.
     """
 
     changes: tuple[Change, ...]
     label: str = ""
-    steps: int = 1
 
     def inverse(self) -> "Edit":
         """Return the edit that reverts this edit."""
@@ -175,10 +172,6 @@ class Edit:
         kept = tuple(c for c in self.changes if c.kind != "version" or c.after is None)
         return replace(self, changes=kept)
 
-    def renamed(self, names: Mapping[Key, str]) -> "Edit":
-        """Return the same edit with new ids."""
-        return replace(self, changes=tuple(change.renamed(names) for change in self.changes))
-
 
 def difference(before: State, after: State, label: str = "") -> Edit:
     """Return the edit from one state to another."""
@@ -191,32 +184,6 @@ def difference(before: State, after: State, label: str = "") -> Edit:
         ),
         label,
     )
-
-
-def folded(steps: Sequence[Edit]) -> Edit:
-    """Return one edit that does what the steps do one after another."""
-    found: dict[Key, Change] = {}
-    for change in (change for step in steps for change in step.changes):
-        first = found.get(change.key, change)
-        found[change.key] = replace(first, after=change.after)
-    count = sum(step.steps for step in steps)
-    changes = tuple(change for change in found.values() if change.before != change.after)
-    return Edit(changes, f"{count} earlier steps", count)
-
-
-def rebased(steps: Iterable[Edit], state: State) -> list[Edit]:
-    """Return the steps as they are after another start; steps that change nothing drop out."""
-    result = []
-    for step in steps:
-        changes = tuple(
-            replace(change, before=state.get(change.key))
-            for change in step.changes
-            if state.get(change.key) != change.after
-        )
-        if changes:
-            result.append(replace(step, changes=changes))
-            state = result[-1].apply(state)
-    return result
 
 
 def merged(

@@ -1,7 +1,6 @@
 """The steps of a document: taken back, applied again, and merged with those of another program."""
 
-import itertools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from palette4d.common.errors import Palette4dError
 from palette4d.grade import edits
@@ -55,7 +54,7 @@ class File:
 def merged(
     file: File, mine: tuple[Grade, History], theirs: tuple[Grade, History]
 ) -> tuple[Grade, History]:
-    """Return the grade and the steps of another program with mine since the file was read.
+    """Return another program's grade with my edits since the file was read, as one more step.
 
     Raises
     ------
@@ -75,20 +74,9 @@ def merged(
     except Palette4dError as error:
         raise Palette4dError(f"{own.name}: {error.message.marked}") from None
     before = file.history.done
-    both = zip(before, history.done, strict=False)
-    shared = sum(1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], both))
-    steps = [
-        replace(step.inverse(), label=f"undo: {step.label}") for step in reversed(before[shared:])
-    ]
-    steps += history.done[shared:]
-    new = edits.rebased([step.renamed(names) for step in steps], other.state)
-    reached = other.state
-    for step in new:
-        reached = step.apply(reached)
-    last = edits.difference(reached, state)
-    if last.undoable().changes:  # the steps on the way there met theirs
-        new = [edits.difference(other.state, state, "edits of two programs").undoable()]
-    if new:
-        undone = tuple(step.renamed(names) for step in history.undone)
-        found = History((*found.done, *new), undone)
+    new = history.done[len(before) :] if history.done[: len(before)] == before else ()
+    label = new[0].label if len(new) == 1 else "edits of two programs"
+    if (step := edits.difference(other.state, state, label).undoable()).changes:
+        # Steps that were undone do not fit what has another id now.
+        found = History((*found.done, step), () if names else history.undone)
     return other.with_mattes(own.mattes).with_state(state), found

@@ -19,7 +19,6 @@ from palette4d.grade.edits import (
     State,
     as_colour,
     as_ramp,
-    folded,
     in_order,
 )
 from palette4d.grade.mattes import Display
@@ -131,21 +130,18 @@ def history_of(members: Mapping[str, Any], name: str) -> tuple[tuple[Edit, ...],
     return found[0], found[1]
 
 
-def bounded(steps: Sequence[Edit]) -> tuple[Edit, ...]:
-    """Return the steps with the oldest folded into one, so that the file stays small.
+def bounded(steps: Sequence[Edit]) -> Sequence[Edit]:
+    """Return the newest steps, so that the file stays small.
 
-    At most `MOST_STEPS` steps remain, with at most `MOST_TEXT` characters beside the newest.
+    They are at most `MOST_STEPS`, with fewer than `MOST_TEXT` characters or only the newest.
     """
-    sizes = [len(json.dumps(_step_fields(step, ()))) for step in steps]
-    kept, total = 0, 0
-    while kept < min(len(steps), MOST_STEPS) and (not kept or total + sizes[-1 - kept] < MOST_TEXT):
-        total += sizes[-1 - kept]
+    kept, length = 0, 0
+    for step in reversed(steps[-MOST_STEPS:]):
+        length += len(json.dumps(_step_fields(step, ())))
+        if kept and length >= MOST_TEXT:
+            break
         kept += 1
-    if kept == len(steps):
-        return tuple(steps)
-    kept = min(kept, MOST_STEPS - 1)
-    old = folded(steps[: len(steps) - kept])
-    return (*[old] * bool(old.changes), *steps[len(steps) - kept :])
+    return steps[len(steps) - kept :]
 
 
 # -------------------------------------------------------------------------------- values and steps
@@ -240,13 +236,10 @@ def _step_fields(step: Edit, vertex_ids: Iterable[str]) -> Fields:
             return edits_fields(value, vertex_ids)
         return value.to_fields() if kind == "pick" else _setting_fields(value)
 
-    fields: Fields = {"step": step.label}
-    if step.steps != 1:
-        fields["steps"] = step.steps
     changes = [
         [c.kind, c.id, plain(c.kind, c.before), plain(c.kind, c.after)] for c in step.changes
     ]
-    return {**fields, "changes": changes}
+    return {"step": step.label, "changes": changes}
 
 
 def _step(fields: Any) -> Edit:
@@ -257,7 +250,7 @@ def _step(fields: Any) -> Edit:
         if not isinstance(id_, str) or before == after:
             raise ValueError(f"the change {kind!r} of {id_!r}")
         changes.append(Change(kind, id_, before, after))
-    label, steps = fields["step"], fields.get("steps", 1)
-    if not isinstance(label, str) or type(steps) is not int or steps < 1 or not changes:
+    label = fields["step"]
+    if not isinstance(label, str) or not changes:
         raise ValueError(f"the step {label!r}")
-    return Edit(tuple(changes), label, steps)
+    return Edit(tuple(changes), label)

@@ -40,14 +40,14 @@ class Output:
     ----------
     show : str
         "recoloured"; "weight:ID", the matte of a vertex or stop, which follows its colour through
-        time; "outside", the matte of the colours outside the palette; "palette", the recoloured
-        picture with the frame's palette below, old colours above new.
+        time; "pick:ID", the matte of a pick or hold; "outside", the matte of the colours outside
+        the palette; "palette", the recoloured picture with the frame's palette below.
     strength : float
         0 the original, 1 the edit.
     keep_lightness : float
         The share of the source's lightness that the recoloured picture keeps, 0..1.
-    lightness_of : str
-        The colour space whose luminance weights define lightness, a key of `LIGHTNESS_OF`.
+    lightness_of : {"auto", "rec709", "rec2020", "p3", "ap1", "rec601"}
+        Whose luminance weights define lightness; "auto": the image's colour space.
     mix : float
         0 the source, 1 the output.
     matte_in : {"picture", "alpha"}
@@ -56,7 +56,8 @@ class Output:
         The distance from the palette, in its code values, at which "outside" is 1.
     clean_up : float
         The share of the change by picks that is filtered along the picture's edges, 0..1, so that
-        codec blocks, soft chroma and rims do not show.
+        codec blocks, soft chroma and rims do not show. The image must be the whole picture: its
+        lower left corner is where the filter's cells begin.
 
     Raises
     ------

@@ -29,26 +29,8 @@ class Drawing(Matting, total=False):
 
     Attributes
     ----------
-    strength : float
-        0 is the original, 1 the edit.
-    keep_lightness : float
-        The share of the source's lightness to keep: 0 none, 1 all.
-    lightness_of : {"auto", "rec709", "rec2020", "p3", "ap1", "rec601"}
-        Whose luminance weights define lightness; "auto": the image's colour space.
-    mix : float
-        0 is the image, 1 the output.
-    show : str
-        "recoloured"; "weight:ID", a soft key of a vertex or stop; "pick:ID", the matte of a
-        pick or hold; "outside", a matte of the colours outside the palette; "palette", the
-        recoloured picture above its palette.
-    matte_in : {"picture", "alpha"}
-        A key or matte as a grey picture, or multiplied into alpha.
-    outside_at : float
-        The distance from the palette, in its code values, at which "outside" is 1.
-    clean_up : float
-        The share of the change by picks that is filtered along the picture's edges, 0..1, so
-        that codec blocks, soft chroma and rims do not show. The image must be the whole
-        picture: its lower left corner is where the filter's cells begin.
+    strength, keep_lightness, lightness_of, mix, show, matte_in, outside_at, clean_up
+        The attributes of `palette4d.grade.output.Output`.
     premultiplied : bool
         Colours are multiplied by alpha.
     space : {"input", "palette"}
