@@ -122,9 +122,10 @@ void spread(const View& view, std::vector<std::size_t> open, Join join) {
     }
 }
 
-/// Adds to a marked part of the background what is connected with it, has its hue, and is nearer
-/// its colour than the pick's.
-void grow_other(const View& view, Mask& marked, const Vec3& pick) {
+/// Adds to marked pixels those that are connected with them and join(pixel, mean marked colour)
+/// takes.
+template <class Join>
+void grow(const View& view, Mask& marked, Join join_of) {
     Vec3 shown{};
     std::vector<std::size_t> open;
     for (std::size_t i = 0; i < view.size(); ++i) {
@@ -133,16 +134,41 @@ void grow_other(const View& view, Mask& marked, const Vec3& pick) {
         open.push_back(i);
     }
     if (open.empty()) return;
-    shown = (1 / static_cast<double>(open.size())) * shown;
-    const Vec3 own = pick_point(shown);
-    const Grid hue = hue_grid(shown);
+    const auto join = join_of(Vec3((1 / static_cast<double>(open.size())) * shown));
     spread(view, std::move(open), [&](std::size_t i) {
-        if (marked[i] || !view.real[i] || view.seed[i]) return false;
-        const Vec3& point = view.point[i];
-        if (pick_distance2(point, own) >= pick_distance2(point, pick)) return false;
-        if (MatteGrid::at(hue.data(), point) < 0.5) return false;
+        if (marked[i] || !view.real[i] || !join(i)) return false;
         marked[i] = 1;
         return true;
+    });
+}
+
+/// A part of the background takes what has its hue and is nearer its colour than the pick's.
+void grow_other(const View& view, Mask& marked, const Vec3& pick) {
+    grow(view, marked, [&](const Vec3& shown) {
+        return [&view, &pick, own = pick_point(shown), hue = hue_grid(shown)](std::size_t i) {
+            const Vec3& point = view.point[i];
+            const auto away = [&point](const Vec3& from) {
+                const double u = point[0] - from[0], v = point[1] - from[1];
+                return u * u + v * v;
+            };
+            return !view.seed[i] && away(own) < away(pick) &&
+                   MatteGrid::at(hue.data(), point) >= 0.5;
+        };
+    });
+}
+
+/// A part of the object that has another colour than the pick takes what has its hue and shade.
+void grow_object(const View& view, Mask& marked, const Vec3& pick) {
+    grow(view, marked, [&](const Vec3& shown) {
+        const Vec3 own = pick_point(shown);
+        const bool other = pick_distance2(own, pick) >= kNear * kNear;
+        return [&view, other, shown, amount = PickedColour(shown),
+                hue = hue_grid(shown)](std::size_t i) {
+            if (!other || view.other[i]) return false;
+            const Vec3 colour{view.shown[0][i], view.shown[1][i], view.shown[2][i]};
+            return amount.amount(colour) > kGrows &&
+                   purity(colour, shown) * MatteGrid::at(hue.data(), view.point[i]) >= 0.5;
+        };
     });
 }
 
@@ -400,6 +426,12 @@ View reduced(const LearningFrame& frame, const Vec3& picked, const DisplayCurve*
         mark(marked, view, {area}, scale);
         grow_other(view, marked, start);
         for (std::size_t i = 0; i < size; ++i) view.other[i] |= marked[i];
+    }
+    for (const Brush& area : frame.object) {
+        Mask marked(size, 0);
+        mark(marked, view, {area}, scale);
+        grow_object(view, marked, start);
+        for (std::size_t i = 0; i < size; ++i) view.seed[i] |= marked[i];
     }
     view.seeded = frame.seeded;
     if (frame.seeded && frame.object.empty()) seed_by_colour(view, start);

@@ -144,6 +144,41 @@ TEST(areas_of_the_background_take_colours_away) {
     CHECK(without.share < with.share);
 }
 
+TEST(an_area_of_another_shade_adds_what_is_connected_with_it) {
+    Frame scene(320, 180, kWall);
+    scene.square(40, 40, 80, 4, kShirt);
+    const Vec3 faded{0.62, 0.5, 0.47};  // less than half the shirt's saturation
+    scene.square(200, 40, 80, 4, faded);
+    scene.add_noise(5, 0.005);
+    const std::vector<Brush> one = {{{{70, 90}}, 5}}, both = {{{{70, 90}}, 5}, {{{215, 55}}, 3}};
+    const LearnedMatte without = learn_matte({scene.frame(kShirt, one)}, kShirt, {}, nullptr),
+                       with = learn_matte({scene.frame(kShirt, both)}, kShirt, {}, nullptr);
+    CHECK(membership(without, faded) < 0.2 && membership(with, faded) > 0.9);
+    CHECK_NEAR(with.share, 2 * without.share, 0.02);
+    CHECK(membership(with, kWall) < 0.05);
+}
+
+TEST(a_thing_of_the_background_is_taken_away_with_its_shadows) {
+    // A face that grows as dark as the shirt, and whose hue is near.
+    Frame scene(320, 180, kWall);
+    scene.square(20, 70, 100, 4, kShirt);
+    const Vec3 lit{0.95, 0.6, 0.42};
+    for (int y = 20; y < 160; ++y) {
+        for (int x = 120; x < 300; ++x) {
+            for (std::size_t c = 0; c < 3; ++c) {
+                scene.at(x, y)[c] = static_cast<float>(lit[c] * (0.6 + 0.4 * (x - 120) / 180));
+            }
+        }
+    }
+    scene.add_noise(6, 0.005);
+    const std::vector<Brush> object = {{{{60, 120}}, 5}}, others = {{{{290, 90}}, 5}};
+    const LearnedMatte matte =
+        learn_matte({scene.frame(kShirt, object, others)}, kShirt, {}, nullptr);
+    CHECK(membership(matte, 0.65 * lit) < 0.2);
+    CHECK(membership(matte, kShirt) > 0.9);
+    CHECK_NEAR(matte.share, 100.0 * 100 / (320 * 180), 0.02);
+}
+
 TEST(held_colours_are_left_out) {
     const Frame scene = shirt();
     const Vec3 shade = 0.5 * kShirt;
