@@ -280,6 +280,11 @@ void bind_sidecar(py::module_& module) {
         "The same for text (str or bytes) in memory; `name` replaces the file name in errors.");
     module.def("clip_name", &palette4d::clip_name, py::arg("file_name"),
                "A media file's name without extension and frame number: that of its sidecar.");
+    module.attr("LONGEST_NAME") = palette4d::kLongestName;
+    module.def(
+        "file_safe", &palette4d::file_safe, py::arg("name"),
+        py::arg("longest") = palette4d::kLongestName,
+        "A name (UTF-8) that is safe in files and in OpenColorIO, of so many bytes at most.");
     module.def("decode_sidecar", &decode, py::arg("text"), py::arg("name") = "<text>",
                "The same, and the members as dicts and lists.");
     module.def("encode_sidecar", &encode, py::arg("members"), py::arg("name") = "<members>",

@@ -216,7 +216,8 @@ std::optional<std::string> find_beside(const std::string& media, const std::stri
     std::vector<fs::path> folders = search_folders(meant(folder));
     folders.insert(folders.begin(), file.parent_path());
     for (const fs::path& base : folders) {
-        for (const std::string& name : {file.stem().u8string(), name_of(media)}) {
+        const std::string stem = file.stem().u8string(), clip = name_of(media);
+        for (const std::string& name : {stem, clip, file_safe(clip)}) {
             const fs::path path = base / native(name + kSidecarEnding);
             if (is_file(path)) return path.u8string();
         }

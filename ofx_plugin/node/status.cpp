@@ -1,5 +1,6 @@
 #include "status.hpp"
 
+#include <iomanip>
 #include <locale>
 #include <optional>
 #include <sstream>
@@ -27,6 +28,17 @@ std::string describe(const Sidecar& sidecar) {
     std::size_t picks = 0;
     for (const Pick& pick : sidecar.edits.picks) picks += pick.enabled;
     if (picks > 0) text << ", " << counted(picks, "pick or hold", "picks and holds");
+    return text.str();
+}
+
+std::string words_of_play(const Sidecar& sidecar) {
+    if (!sidecar.play) return "";
+    if (sidecar.play->speed == 0) return "the edit shows a freeze frame";
+    std::ostringstream text;
+    text.imbue(std::locale::classic());
+    text << "the edit plays it with Speed " << std::setprecision(9) << sidecar.play->speed
+         << (sidecar.play->reverse ? ", Reverse on" : "") << ", In-point "
+         << sidecar.play->in_point;
     return text.str();
 }
 
@@ -103,6 +115,7 @@ std::string status_of(const Chosen& chosen, const std::vector<std::string>& firs
         lines.push_back(text);
         if (!chosen.embedded) lines.push_back("file " + chosen.path);
         lines.push_back(words_of_versions(sidecar));
+        lines.push_back(words_of_play(sidecar));
         if (!chosen.media.empty() && !same_clip(chosen.media, sidecar.clip.source)) {
             lines.push_back("note: this sidecar is of " + sidecar.clip.source +
                             ", and the host's clip is " + chosen.media);

@@ -139,6 +139,12 @@ class Slice:
 
 def read_sidecar(path: str | os.PathLike[str]) -> Sidecar: ...
 def parse_sidecar(text: str | bytes, name: str = ...) -> Sidecar: ...
+
+LONGEST_NAME: int
+
+def file_safe(name: str | bytes, longest: int = ...) -> str:
+    """A name (UTF-8) that is safe in files and in OpenColorIO, of so many bytes at most."""
+
 def clip_name(file_name: str) -> str:
     """A media file's name without extension and frame number: that of its sidecar."""
 

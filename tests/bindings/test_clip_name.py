@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import unicodedata
+
 import pytest
 
 from palette4d import _core
+from palette4d.common.text import file_safe
 from palette4d.media.clip_sequence import IMAGE_EXTENSIONS, MOVIE_EXTENSIONS
 from palette4d.shows.timeline_shots import _name
 
@@ -44,7 +47,46 @@ def test_every_image_and_movie_is_known_on_both_sides() -> None:
         ("sh010.1001.exr", "sh010"),
         ("sh010.v2", "sh010.v2"),
         ("sh 010", "sh_010"),
+        ("Grün – 1.mov", "Grün_–_1"),
+        ("Gru\u0308n.0001.exr", "Grün"),
+        ("日本語.mov", "日本語"),
+        ("\u0926\u093f\u0932.mov", "\u0926\u093f\u0932"),
     ],
 )
 def test_shots_are_named_as_the_node_looks_for_them(clip: str, shot: str) -> None:
     assert _name(clip) == shot
+
+
+@pytest.mark.parametrize(
+    ("name", "safe"),
+    [
+        ("a\u202eb\u00a0c\u3000d\ufeff", "a_b_c_d_"),
+        ('a:b*c?d"e<f>g|h/i\\\\j', "a_b_c_d_e_f_g_h_i_j"),
+        ("../..", "_"),
+        ("-.x.-", "x"),
+        ("", "clip"),
+        ("é" * 80, "é" * 60),
+        ("a" + "日" * 80, "a" + "日" * 39),
+        ("\ud800\udcff.mov", "_.mov"),
+        ("a\n\x7f\x9fb", "a_b"),
+    ],
+)
+def test_names_that_are_safe_in_files(name: str, safe: str) -> None:
+    assert file_safe(name) == file_safe(safe) == safe
+
+
+def test_every_letter_of_every_language_stays() -> None:
+    """Of all characters those are unsafe that Unicode calls spaces, controls and private."""
+    for code in (*range(0x80, 0xD800), *range(0xE000, 0x30000)):
+        kind = unicodedata.category(chr(code))
+        if kind[0] in "LMN":
+            assert _core.file_safe(f"a{chr(code)}") == f"a{chr(code)}"
+        elif kind[0] == "Z" or kind in ("Cc", "Co"):
+            assert _core.file_safe(f"a{chr(code)}") == "a_", hex(code)
+
+
+@pytest.mark.parametrize(
+    "bad", [b"\x80", b"\xc0\xaf", b"\xe0\x80\xaf", b"\xed\xa0\x80", b"\xf5", b"\xe6"]
+)
+def test_bytes_that_are_no_utf_8_become_one_line(bad: bytes) -> None:
+    assert _core.file_safe(b"a" + bad + b"b") == "a_b"

@@ -96,6 +96,19 @@ TEST(where_a_sidecar_of_the_clips_name_is_searched) {
     CHECK(page.render(*movie, 12, 12) == page.unchanged());
 }
 
+TEST(shots_are_found_by_the_names_that_the_analysis_gives_them) {
+    Page page;
+    for (const auto& [clip, shot] : {std::pair("sh 010.mov", "sh_010"),
+                                     {"Gr\u00fcn + Rot.mov", "Gr\u00fcn_Rot"},
+                                     {"\u65e5\u672c.1001.exr", "\u65e5\u672c"}}) {
+        const auto node = page.clip((folder() / fs::u8path(clip)).u8string());
+        CHECK(page.render(*node, 12, 12) == page.unchanged());
+        write(std::string(shot) + ".p4d.json", text_of(clip));
+        CHECK(node->changed("reload") == kOfxStatOK);
+        EXPECT(node->text("status").find("3 edits") != std::string::npos, node->text("status"));
+    }
+}
+
 TEST(a_grade_that_was_copied_to_another_clip_says_so) {
     Page page;
     const std::string path = write("a.p4d.json", text_of("a.mov"));

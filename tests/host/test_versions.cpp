@@ -49,6 +49,32 @@ struct Scene : Ready {
 
 }  // namespace
 
+TEST(the_status_says_how_an_edit_plays_the_shot) {
+    const auto status = [](const std::string& extra) {
+        std::string text = sidecar_text();
+        const std::string empty = R"("extra": {})";
+        Scene scene(text.replace(text.find(empty), empty.size(), R"("extra": )" + extra));
+        CHECK(scene.instance->changed("reload") == kOfxStatOK);
+        return scene.instance->text("status");
+    };
+    const auto has = [&](const std::string& edit, const std::string& words) {
+        const std::string text = status(R"({"edit": )" + edit + "}");
+        EXPECT((text.find("the edit") != std::string::npos) == !words.empty(), text);
+        EXPECT(text.find(words) != std::string::npos, text);
+    };
+    has(R"({"speed": 1.5, "reverse": true, "inPoint": 8})",
+        "\nthe edit plays it with Speed 1.5, Reverse on, In-point 8\n");
+    has(R"({"speed": 0.333333333, "reverse": false, "inPoint": 0, "cdl": {}})",
+        "\nthe edit plays it with Speed 0.333333333, In-point 0\n");
+    has(R"({"speed": 0, "reverse": false, "inPoint": 0})", "\nthe edit shows a freeze frame\n");
+    // Other programs may have written anything there.
+    for (const char* other : {"{}", "3", "null", "[1]", R"({"speed": "x"})",
+                              R"({"speed": 2, "inPoint": {}, "reverse": true})"}) {
+        has(other, "");
+    }
+    EXPECT(status("{}").find("the edit") == std::string::npos, status("{}"));
+}
+
 TEST(the_node_applies_the_picks) {
     Scene scene(text_with(kPicks, ""));
     palette4d::Edits without = scene.parsed.edits;

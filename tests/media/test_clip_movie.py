@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import av
 import numpy as np
 import pytest
 from av.video.reformatter import ColorRange, Colorspace
@@ -271,6 +272,42 @@ def test_movie_that_ends_early(tmp_path):
     path.write_bytes(whole[: len(whole) // 2])
     with pytest.raises(ClipError, match=r"a\.mp4"):
         list(open_clip(str(path)))
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "layout"),
+    [
+        ("a.mkv", "ffv1", "bgr0"),
+        ("a.webm", "libvpx-vp9", "yuv420p"),
+        ("a.mxf", "mpeg2video", "yuv422p"),
+        ("a.avi", "mjpeg", "yuvj420p"),
+    ],
+)
+def test_a_file_that_is_cut_short_has_the_frames_that_it_promises(tmp_path, name, codec, layout):
+    """Matroska and MXF state a time, no number of frames."""
+    path = write_movie(tmp_path / name, codec, layout, noise(30), "rgb24", rate=Fraction(25))
+    assert len(open_clip(str(path)).frames) == 30
+    path.write_bytes(path.read_bytes()[: path.stat().st_size * 6 // 10])
+    with pytest.raises(FrameError, match=r"is missing: the file ends after \d+ of 30 frames"):
+        open_clip(str(path))
+    clip = open_clip(str(path), skip_bad_frames=True)
+    good = [image.frame for image in clip.iter_images()]
+    assert clip.frames == [*good, *clip.skipped] == list(range(30))
+    assert 10 < len(good) < 25
+
+
+def test_fragments_that_are_cut_short_are_noted(tmp_path):
+    path = tmp_path / "a.mp4"
+    with av.open(str(path), "w", options={"movflags": "frag_every_frame+empty_moov"}) as movie:
+        stream = movie.add_stream("mpeg4", rate=25)
+        stream.height, stream.width = HEIGHT, WIDTH
+        for pixels in noise(30):
+            movie.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, "rgb24")))
+        movie.mux(stream.encode())
+    assert not open_clip(str(path)).notes
+    path.write_bytes(path.read_bytes()[: path.stat().st_size * 6 // 10])
+    (note,) = open_clip(str(path), skip_bad_frames=True).notes
+    assert "does not say how many are missing behind the" in note
 
 
 def test_what_is_no_movie(tmp_path):

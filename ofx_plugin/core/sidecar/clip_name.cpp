@@ -1,5 +1,7 @@
 #include "sidecar/clip_name.hpp"
 
+#include <cstdint>
+
 namespace palette4d {
 namespace {
 
@@ -7,6 +9,58 @@ namespace {
 std::size_t stem_length(const std::string& file_name) {
     const std::size_t dot = file_name.rfind('.');
     return dot == std::string::npos || dot == 0 ? file_name.size() : dot;
+}
+
+/// The code point at `at` and its length in bytes; U+FFFD for a byte that is no UTF-8.
+struct CodePoint {
+    std::uint32_t value = 0xfffd;
+    std::size_t length = 1;
+};
+
+CodePoint code_point(const std::string& text, std::size_t at) {
+    const auto byte = [&](std::size_t i) {
+        return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;
+    };
+    const unsigned first = byte(at);
+    if (first < 0x80) return {first, 1};
+    const std::size_t more = first >= 0xf0 ? 3 : first >= 0xe0 ? 2 : first >= 0xc2 ? 1 : 0;
+    if (more == 0 || first > 0xf4) return {};
+    std::uint32_t value = first & (0x3fu >> more);
+    for (std::size_t i = 1; i <= more; ++i) {
+        if ((byte(at + i) & 0xc0u) != 0x80) return {};
+        value = value << 6 | (byte(at + i) & 0x3fu);
+    }
+    constexpr std::uint32_t kLeast[] = {0, 0x80, 0x800, 0x10000};
+    if (value < kLeast[more] || value > 0x10ffff || (value >= 0xd800 && value < 0xe000)) return {};
+    return {value, more + 1};
+}
+
+/// Controls, spaces, marks without a shape, private and special characters (Unicode: Cc, Cf, Co,
+/// Z).
+bool is_unsafe(std::uint32_t c) {
+    if (c < 0x80) {
+        return !((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                 c == '.' || c == '_' || c == '-');
+    }
+    struct Range {
+        std::uint32_t first, last;
+    };
+    for (const Range& range : {Range{0x80, 0xa0},
+                               {0xad, 0xad},
+                               {0x61c, 0x61c},
+                               {0x1680, 0x1680},
+                               {0x180e, 0x180e},
+                               {0x2000, 0x200f},
+                               {0x2028, 0x202f},
+                               {0x205f, 0x206f},
+                               {0x3000, 0x3000},
+                               {0xe000, 0xf8ff},
+                               {0xfeff, 0xfeff},
+                               {0xfff0, 0xffff},
+                               {0xe0000, 0x10ffff}}) {
+        if (c >= range.first && c <= range.last) return true;
+    }
+    return false;
 }
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
@@ -39,6 +93,24 @@ std::size_t without_number(const std::string& stem) {
 std::string clip_name(const std::string& file_name) {
     const std::string stem = file_name.substr(0, stem_length(file_name));
     return is_still(file_name) ? stem.substr(0, without_number(stem)) : stem;
+}
+
+std::string file_safe(const std::string& name, std::size_t longest) {
+    std::string result;
+    bool replaced = false;
+    for (std::size_t at = 0; at < name.size();) {
+        const CodePoint one = code_point(name, at);
+        const bool unsafe = is_unsafe(one.value);
+        const std::string next = unsafe ? "_" : name.substr(at, one.length);
+        at += one.length;
+        if (unsafe && replaced) continue;
+        if (result.size() + next.size() > longest) break;
+        result += next;
+        replaced = unsafe;
+    }
+    const std::size_t begin = result.find_first_not_of("-.");
+    if (begin == std::string::npos) return "clip";
+    return result.substr(begin, result.find_last_not_of("-.") + 1 - begin);
 }
 
 }  // namespace palette4d

@@ -20,4 +20,12 @@ std::size_t without_number(const std::string& stem);
 /// `shot.mov`, `shot.1001.exr` and `shot.####.exr` are all of `shot`.
 std::string clip_name(const std::string& file_name);
 
+/// The longest name of a shot or a series, in bytes: with frame number and extensions it fits any
+/// disk.
+inline constexpr std::size_t kLongestName = 120;
+
+/// A name (UTF-8) that is safe in files and in OpenColorIO. Letters of all languages, digits and
+/// . _ - stay. Each run of other ASCII characters, spaces and invisible characters becomes _.
+std::string file_safe(const std::string& name, std::size_t longest = kLongestName);
+
 }  // namespace palette4d

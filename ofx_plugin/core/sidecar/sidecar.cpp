@@ -27,6 +27,16 @@ void check_members(const Cursor& root) {
     check(root, sidecar_schema(), number == 1 ? 1 : kSidecarVersion);
 }
 
+/// "extra" is free-form: what is not as palette4d writes it is passed over.
+std::optional<PlayInEdit> play_in(const Json& root) {
+    const Json edit = root.value(Json::json_pointer("/extra/edit"), Json());
+    if (!edit.is_object()) return std::nullopt;
+    const Json speed = edit.value("speed", Json()), at = edit.value("inPoint", Json());
+    const Json reverse = edit.value("reverse", Json());
+    if (!speed.is_number() || !at.is_number() || !reverse.is_boolean()) return std::nullopt;
+    return PlayInEdit{speed.get<double>(), at.get<double>(), reverse.get<bool>()};
+}
+
 }  // namespace
 
 Sidecar sidecar_of(const Json& members, const std::string& name) {
@@ -46,13 +56,14 @@ Sidecar sidecar_of(const Json& members, const std::string& name) {
     if (root.has("versions")) {
         sidecar.versions = read_versions(root.member("versions"), sidecar.polytope, mattes);
     }
+    sidecar.play = play_in(root.json());
     if (root.has("colours")) check_colours(root.member("colours"));
     return sidecar;
 }
 
 Sidecar with_edits(const Sidecar& palette, const Json& edits, const Json& mattes,
                    const std::string& name) {
-    Sidecar result{palette.clip, palette.polytope, {}, {}, {}, palette.conversion};
+    Sidecar result{palette.clip, palette.polytope, {}, {}, {}, palette.conversion, palette.play};
     const Json members = {{"edits", edits}, {"mattes", mattes}};
     const Cursor root(members, name);
     for (const char* const part : {"edits", "mattes"}) {

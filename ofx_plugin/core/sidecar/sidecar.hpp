@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -31,6 +32,13 @@ struct ClipConversion {
     ColourConversion steps;
 };
 
+/// How an edit plays the shot, in the node's parameters: the member "extra.edit", which the
+/// analysis of an edit writes. Speed 0 is a freeze frame.
+struct PlayInEdit {
+    double speed = 1, in_point = 0;
+    bool reverse = false;
+};
+
 /// Edits that the user keeps under a name.
 struct NamedVersion {
     std::string name;
@@ -56,6 +64,8 @@ struct Sidecar {
     PickMattes mattes;
     /// Null where the palette is in the clip's own code values.
     std::shared_ptr<const ClipConversion> conversion;
+    /// Where an edit plays the shot at another speed than the media's.
+    std::optional<PlayInEdit> play;
 };
 
 inline constexpr int kSidecarVersion = 2;

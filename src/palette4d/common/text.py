@@ -1,9 +1,11 @@
 """Counts in messages, text for terminals, and safe file names."""
 
 import re
+import unicodedata
 from collections.abc import Sequence
 from typing import Any
 
+from palette4d import _core
 from palette4d.common.errors import Palette4dError
 
 
@@ -24,9 +26,6 @@ def percent(share: float) -> str:
     """
     return f"{100 * share:.{0 if share >= 0.0995 else 1}f} %"
 
-
-#: The longest name of a shot or a series: with frame number and extensions it fits any disk.
-LONGEST_NAME = 120
 
 # Control characters, line and paragraph separators, marks that turn the direction of writing, and
 # halves of characters, which no encoding can write.
@@ -60,12 +59,13 @@ def on_lines(value: Any) -> Any:
 def file_safe(name: str) -> str:
     """Return a name that is safe in files and in OpenColorIO: letters, digits, . _ -.
 
-    It has at most `LONGEST_NAME` characters.
+    Letters of all languages stay, composed (NFC). It has at most `_core.LONGEST_NAME` bytes.
 
-    >>> file_safe("shot 010/a+b"), file_safe("-x")
-    ('shot_010_a_b', 'x')
+    >>> file_safe("shot 010/a+b"), file_safe("-x"), file_safe("Gru\u0308n")
+    ('shot_010_a_b', 'x', 'Grün')
     """
-    return re.sub(r"[^A-Za-z0-9._-]+", "_", name)[:LONGEST_NAME].strip("-.") or "clip"
+    composed = unicodedata.normalize("NFC", name)
+    return _core.file_safe(composed.encode("utf-8", "replace"))
 
 
 def checked_name(name: str) -> str:
@@ -73,7 +73,7 @@ def checked_name(name: str) -> str:
     if file_safe(name) != name:
         raise Palette4dError(
             f"found the name {name!r}, expected letters, digits, '.', '_' and '-' only, at most "
-            f"{LONGEST_NAME}, as in {file_safe(name)!r}"
+            f"{_core.LONGEST_NAME} bytes of UTF-8, as in {file_safe(name)!r}"
         )
     return name
 

@@ -38,6 +38,7 @@ from palette4d.media.clip_base import (
 )
 from palette4d.media.colour_tags import LUMA_WEIGHTS, MATRICES, UNKNOWN, UNREADABLE, encoding_of
 from palette4d.media.movie_boxes import boxes
+from palette4d.media.movie_length import is_cut_short, promised_frames
 from palette4d.media.movie_pixels import (
     bin_picture,
     is_luma_chroma,
@@ -250,7 +251,13 @@ def open_movie(
         stated = stated_by(container, stream, first)
         own_rate = stream.average_rate or stream.guessed_rate or stream.base_rate
         base = stream.time_base
+        fragments = "mov" in container.format.name
     count = max(promised, packets)
+    if not promised and fragments and is_cut_short(path):
+        notes.append(
+            f"{path}: the file ends in the middle of its frames, and does not say how many are "
+            f"missing behind the {packets} that are there; bring a whole copy"
+        )
     wanted = list(range(count))
     if frames is not None:
         wanted = parse_frames(frames)
@@ -407,7 +414,9 @@ def _index(
             f"{path}: no frame can be decoded (codec {stream.codec_context.name}); expected a "
             "movie with at least one whole frame. Bring a good copy, or convert it to images."
         )
-    promised = 0 if by_decoding else max(stream.frames - discarded, 0)
+    promised = 0
+    if not by_decoding:
+        promised = max(promised_frames(container, stream, path) - discarded, 0)
     known = [stamp for stamp in stamps if stamp is not None]
     if len(known) == len(stamps) == len(set(known)):
         known.sort()

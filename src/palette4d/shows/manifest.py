@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import re
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -27,7 +26,8 @@ ENDING = ".shots.json"
 #: The largest frame number, and part of a rate.
 LARGEST_NUMBER = 2**31 - 1
 
-_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,199}")
+#: Bytes of a shot's name, with what makes it different from others.
+_LONGEST_NAME = 200
 
 DONE, FAILED, TO_DO = "done", "failed", "to do"
 
@@ -182,7 +182,7 @@ def _entry(row: dict[str, Any]) -> Entry:
     if step < 1:
         raise ValueError(f"step {step}")
     name = _text(row["name"])
-    if row["sidecar"] != f"{name}.p4d.json" or not _NAME.fullmatch(name):
+    if row["sidecar"] != f"{name}.p4d.json" or _core.file_safe(name, _LONGEST_NAME) != name:
         raise ValueError(f"sidecar {row['sidecar']!r} of the shot {name!r}")
     shot = Shot(
         name,

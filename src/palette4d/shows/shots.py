@@ -100,13 +100,13 @@ def numbered(shots: Iterable[Shot]) -> tuple[list[Shot], list[str]]:
     out, changed = [], []
     for shot in shots:
         name = shot.name
-        if name.lower() in taken:
+        if name.casefold() in taken:
             name = begin = f"{shot.name}_f{shot.used[0]}"
-            again = numbers.setdefault(begin.lower(), itertools.count(2))
-            while name.lower() in taken:
+            again = numbers.setdefault(begin.casefold(), itertools.count(2))
+            while name.casefold() in taken:
                 name = f"{begin}_{next(again)}"
             changed.append(name)
-        taken.add(name.lower())
+        taken.add(name.casefold())
         out.append(dataclasses.replace(shot, name=name))
     return out, changed
 
