@@ -92,6 +92,7 @@ def draw_picks(folder: Path) -> None:
     edit(sidecar, "area", "p1", *at, "--pixel", "60,330", "--box", "15")
     edit(sidecar, "hold", *at, "--pixel", "738,282", "--box", "5")
     draw("studio_picks", sidecar, 53, picks)
+    draw("studio_scopes", sidecar, 53, scopes, part="scopes")
 
 
 def rose(window: Any) -> str:
@@ -119,6 +120,21 @@ def solid(window: Any) -> None:
     """Select the rose of autumn, seen from the side."""
     window.session.select(rose(window))
     window.solid.azimuth, window.solid.elevation = 24.0, 14.0
+
+
+def scopes(window: Any) -> None:
+    """Show all scopes, before and after."""
+    from PySide6.QtCore import Qt
+
+    window.session.select("p1")
+    window.session.look(compare="wipe")
+    window.docks["inspector"].hide()
+    window.docks["history"].hide()
+    window.show_or_hide("scopes")
+    window.resizeDocks([window.docks["scopes"]], [840], Qt.Orientation.Horizontal)
+    for button in window.scopes.buttons.values():
+        if not button.isChecked():
+            button.click()
 
 
 def picks(window: Any) -> None:

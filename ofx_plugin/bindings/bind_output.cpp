@@ -9,6 +9,7 @@
 #include "binders.hpp"
 #include "convert/colour_spaces.hpp"
 #include "output/drawing.hpp"
+#include "output/scopes.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;
@@ -65,6 +66,22 @@ py::array draw(const py::array& image, const std::string& output,
     return result;
 }
 
+py::tuple scope_counts(const py::array& image, int columns, double zoom, int threads) {
+    require_image(image, "image");
+    if (columns < 1) throw py::value_error("columns: found less than 1, expected 1 or more");
+    if (!(zoom > 0)) throw py::value_error("zoom: expected a number above 0");
+    if (threads < 0) throw py::value_error("threads: found less than 0, expected 0 or more");
+    const auto view = view_of<ConstImageView>(image, static_cast<const float*>(image.data()));
+    const ScopeCounts counts = [&] {
+        const py::gil_scoped_release unlocked;
+        return count_scopes(view, columns, zoom, threads);
+    }();
+    using Counts = py::array_t<std::uint32_t>;
+    return py::make_tuple(
+        Counts({counts.columns, kScopeTraces, kScopeLevels}, counts.waveform.data()),
+        Counts({kScopeVectors, kScopeVectors}, counts.vectors.data()));
+}
+
 }  // namespace
 
 void bind_output(py::module_& module) {
@@ -76,6 +93,10 @@ void bind_output(py::module_& module) {
                py::arg("clean_up") = 1.0, py::arg("premultiplied") = false, py::arg("threads") = 1,
                py::arg("conversion") = py::none(),
                "(h, w, 3 or 4) float32 in and out: what the node draws for a frame.");
+    module.def("scope_counts", &scope_counts, py::arg("image"), py::kw_only(),
+               py::arg("columns") = 480, py::arg("zoom") = 1.0, py::arg("threads") = 0,
+               "What waveform, parade and vectorscope show of display code values, as counts.");
+    module.attr("SCOPE_BELOW") = kScopeBelow;
     module.def("luminance_weights", &luminance_weights, py::arg("encoding"),
                "Weights of red, green and blue by an encoding's name; Rec.709's if unknown.");
 }

@@ -13,7 +13,7 @@ void bind_sidecar(py::module_& module);     ///< Edits, Sidecar, read_sidecar, p
 void bind_slice(py::module_& module);       ///< Slice, slice_at, edited_colours, readers
 void bind_mvc(py::module_& module);         ///< mean value coordinates and palette weights
 void bind_recolour(py::module_& module);    ///< Recolourer
-void bind_output(py::module_& module);      ///< draw, luminance_weights
+void bind_output(py::module_& module);      ///< draw, scope_counts, luminance_weights
 void bind_gpu(py::module_& module);         ///< the kernel's text and tables
 void bind_bins(py::module_& module);        ///< ColourBinner
 void bind_analysis(py::module_& module);    ///< the hot loops of palette4d.analysis

@@ -308,6 +308,21 @@ def draw(
     `original` and `edited` are the (n, 3) colours of "palette". `lightness` are three weights.
     """
 
+def scope_counts(
+    image: NDArray[np.float32], *, columns: int = ..., zoom: float = ..., threads: int = ...
+) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+    """Return what waveform, parade and vectorscope show of display code values, as pixel counts.
+
+    The first result is (columns, 4, 288): of each column the levels of Rec.709 luma, red, green and
+    blue. Level `SCOPE_BELOW` is code value 0, a level is 1/255. A picture with fewer pixels in a
+    row has fewer columns. The second result is (257, 257): rows are Cr from +0.5 / zoom down,
+    columns Cb from -0.5 / zoom on. What is beyond a scope counts at its rim; pixels with a NaN are
+    left out.
+    """
+
+SCOPE_BELOW: int
+"""Levels of `scope_counts` below black; as many are above white."""
+
 def weight_reader(polytope: Polytope, edits: Edits, slice: Slice, id: str) -> F64:
     """(n, 3) float64 edited colours whose Recolourer draws the matte of a vertex or stop."""
 

@@ -72,14 +72,14 @@ class Painter:
         exact = config.getProcessor(transform)
         self._exact = _to_8_bits(exact)
         self._quick, self.error = self._exact, 0.0
+        self._floats = exact.getDefaultCPUProcessor()
         steps = exact.getOptimizedProcessor(ocio.OPTIMIZATION_DEFAULT).createGroupTransform()
         if any(type(step).__name__.startswith(SLOW) for step in steps):
-            floats = exact.getDefaultCPUProcessor()
             shaper, undo = _shaper(scene_linear)
             axis = np.linspace(0, 1, GRID, dtype=np.float32)
             grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
             values = np.ascontiguousarray(undo(grid).reshape(1, -1, 3))
-            floats.applyRGB(values)
+            self._floats.applyRGB(values)
             lut = ocio.Lut3DTransform(GRID)
             lut.setInterpolation(ocio.INTERP_TETRAHEDRAL)
             lut.setData(values.reshape(-1))
@@ -88,8 +88,9 @@ class Painter:
             sample = np.random.default_rng(5).random((1, 16_384, 3), np.float32)
             probes = np.ascontiguousarray(undo(sample))
             near, true = probes.copy(), probes
-            quick.getDefaultCPUProcessor().applyRGB(near)
-            floats.applyRGB(true)
+            self._floats.applyRGB(true)
+            self._floats = quick.getDefaultCPUProcessor()
+            self._floats.applyRGB(near)
             self.error = float(np.abs(np.clip(near, 0, 1) - np.clip(true, 0, 1)).max())
 
     def paint(self, colours: F32, *, exact: bool = True, threads: bool = True) -> U8:
@@ -101,6 +102,16 @@ class Painter:
         rows = np.linspace(0, len(colours), (os.cpu_count() or 1) + 1).astype(int)
         parts = list(itertools.pairwise(rows))
         list(_THREADS.map(lambda part: self._run(cpu, colours[slice(*part)], part, result), parts))
+        return result
+
+    def values(self, colours: F32) -> F32:
+        """Return the display code values of (h, w, 3) code values, in floats and not clamped.
+
+        A view that is slow goes through its LUT.
+        """
+        result = np.array(colours, np.float32, order="C")
+        if result.size:
+            self._floats.applyRGB(result.reshape(1, -1, 3))
         return result
 
     @staticmethod

@@ -67,6 +67,7 @@ class MenuActions:
                 exposure=max(session.view.exposure - EXPOSURE_STEP, -EXPOSURE)
             ),
             "plain_look": lambda: session.look(exposure=0.0, gamma=1.0),
+            "scopes": lambda: window.show_or_hide("scopes"),
             "full_screen": lambda: window.setWindowState(
                 window.windowState() ^ Qt.WindowState.WindowFullScreen
             ),

@@ -95,6 +95,7 @@ ACTIONS = (
     Action("brighter", VIEW, ("E",), group=3),
     Action("darker", VIEW, ("Shift+E",), group=3),
     Action("plain_look", VIEW, ("Ctrl+0",), group=3),
+    Action("scopes", VIEW, ("Ctrl+Shift+W",), group=4),
     Action("full_screen", VIEW, ("F11",), True, 4),
     Action("play", PLAYBACK, ("Space",)),
     Action("play_backwards", PLAYBACK, ("J",)),

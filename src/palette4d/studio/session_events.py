@@ -28,6 +28,7 @@ Event = Literal[
     "followed",  # an edit has read the clip, or failed
     "draft",  # what a pick of the clicked pixel takes is learned
     "answer",  # what the selected pick takes is known, or is not any more
+    "picture",  # the viewer shows another picture
     "tool",  # what a click in the picture does
 ]
 

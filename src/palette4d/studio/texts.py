@@ -151,6 +151,7 @@ ACTIONS = {
         "brighter": "Exposure up",
         "darker": "Exposure down",
         "plain_look": "Reset exposure and gamma",
+        "scopes": "Show or hide the scopes",
         "full_screen": "Full screen",
         "play": "Play or stop",
         "play_backwards": "Play backwards, faster",
@@ -377,6 +378,24 @@ CONCAVE_EDGE, CONCAVE_EDGES = "concave edge", "concave edges"
 CONCAVE_WHY = "Notched: gradients bend there."
 FLIPPED_FACE, FLIPPED_FACES = "face turned inside out", "faces turned inside out"
 FLIPPED_WHY = "Hatched: colours cross there, and gradients may fold. If you see it, change less."
+
+# ------------------------------------------------------------------------------------- the scopes
+SCOPES_PANEL = "Scopes"
+SCOPES_SHOWN = {
+    "waveform": "Waveform",
+    "parade": "Parade",
+    "vectorscope": "Vectorscope",
+    "histogram": "Histogram",
+}
+SCOPE_TIPS_SHOWN = {
+    "waveform": "Luma of each column of the picture; 0 and 1023 are black and white",
+    "parade": "Red, green and blue of each column of the picture",
+    "vectorscope": "Hue and chroma, with the line of skin tones and the picks' colours",
+    "histogram": "How many pixels have which red, green and blue",
+}
+SCOPE_ZOOM, SCOPE_ZOOM_TIP = "2×", "Enlarge the vectorscope"
+NO_SCOPE, NOTHING_MEASURED = "Choose a scope above.", "no picture"
+GHOST = "line: before"
 
 # ----------------------------------------------------------------------------------- the inspector
 NOTHING_SELECTED = "Nothing is selected"

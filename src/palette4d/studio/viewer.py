@@ -258,6 +258,7 @@ class Viewer(QWidget):
         else:
             self.images.pop("outside", None)
         self.update()
+        self.session.emit("picture")
 
     # ------------------------------------------------------------------------------- where it is
 

@@ -48,6 +48,7 @@ from palette4d.studio.instance import Listener
 from palette4d.studio.menu_actions import MenuActions
 from palette4d.studio.menu_entries import ACTIONS, Action
 from palette4d.studio.paths import sequence_of
+from palette4d.studio.scopes_view import Scopes
 from palette4d.studio.session import Session
 from palette4d.studio.shot_list import Shots
 from palette4d.studio.solid_view import SolidView
@@ -171,6 +172,7 @@ class Window(QMainWindow):
         self.transport = Transport(session, self.playback)
         self.timeline = TimelineView(session)
         self.solid = SolidView(session)
+        self.scopes = Scopes(session, self.viewer, self.settings)
         self.inspector = Inspector(session)
         self.viewer.on_pick, self.viewer.on_hold = self.inspector.pick, self.inspector.hold
         self.viewer.on_area = self.inspector.add_area
@@ -216,6 +218,7 @@ class Window(QMainWindow):
         self.setCorner(Qt.Corner.BottomLeftCorner, area.BottomDockWidgetArea)
         self.docks = {
             "solid": self._dock(texts.SOLID, self.solid, area.RightDockWidgetArea),
+            "scopes": self._dock(texts.SCOPES_PANEL, self.scopes, area.RightDockWidgetArea),
             "inspector": self._dock(texts.INSPECTOR, self.inspector, area.RightDockWidgetArea),
             "history": self._dock(texts.HISTORY, self.history, area.RightDockWidgetArea),
             "timeline": self._dock(texts.TIMELINE, self.timeline, area.BottomDockWidgetArea),
@@ -223,6 +226,11 @@ class Window(QMainWindow):
         }
         self.tabifyDockWidget(self.docks["inspector"], self.docks["history"])
         self.docks["inspector"].raise_()
+        self.tabifyDockWidget(self.docks["solid"], self.docks["scopes"])
+        self.docks["solid"].raise_()
+        self.docks["scopes"].visibilityChanged.connect(
+            lambda _: self.turns.later(self.scopes.follow)  # when it is where it will be
+        )
         self.docks["shots"].hide()
         # The timeline needs no title: it is told by what it shows.
         self.docks["timeline"].setTitleBarWidget(QWidget())
@@ -256,6 +264,15 @@ class Window(QMainWindow):
                 event.ignore()
                 return True
         return super().eventFilter(watched, event)
+
+    def show_or_hide(self, panel: str) -> None:
+        """Show a panel above those that it lies below; hide it if it is seen."""
+        dock = self.docks[panel]
+        if dock.widget().visibleRegion().isEmpty():
+            dock.show()
+            dock.raise_()
+        else:
+            dock.hide()
 
     def arrange(self) -> None:
         """Give the panels their usual sizes."""
@@ -521,6 +538,7 @@ class Window(QMainWindow):
             and session.player.idle
             and self.inspector.panel.settled
             and self.turns.settled
+            and self.scopes.settled
             and (self.timeline.settled or not self.timeline.isVisible())
         )
 

@@ -1,0 +1,51 @@
+// Counts of the scopes where a picture of few pixels gives them; tests/parity compares the rest.
+#include "output/scopes.hpp"
+
+#include <numeric>
+
+#include "check.hpp"
+#include "images.hpp"
+
+using namespace palette4d;
+using images::Image;
+using images::kInf;
+using images::kNan;
+
+namespace {
+
+ScopeCounts counted(const Image& image, int columns, int threads) {
+    return count_scopes(image.in(), columns, 1, threads);
+}
+
+}  // namespace
+
+TEST(every_pixel_counts_once_in_each_scope) {
+    Image image(37, 23, 4);
+    for (std::size_t i = 0; i < image.data.size(); ++i) {
+        image.data[i] = static_cast<float>(i * 7919 % 1000) / 500 - 0.5F;
+    }
+    for (const int threads : {1, 4}) {
+        const ScopeCounts counts = counted(image, 20, threads);
+        CHECK_EQUAL(counts.columns, 20);
+        const auto sum = [](const std::vector<std::uint32_t>& all) {
+            return std::accumulate(all.begin(), all.end(), 0U);
+        };
+        CHECK_EQUAL(sum(counts.waveform), 37U * 23U * kScopeTraces);
+        CHECK_EQUAL(sum(counts.vectors), 37U * 23U);
+        CHECK(counts.waveform == counted(image, 20, 1).waveform);
+    }
+}
+
+TEST(rims_take_what_is_beyond_and_nan_counts_nowhere) {
+    Image image(3, 1, 3);
+    image.data = {kInf, kInf, kInf, -kInf, 0, 0, kNan, 1, 1};
+    const ScopeCounts counts = counted(image, 3, 1);
+    const auto count = [&](int column, int trace, int level) {
+        return counts.waveform[static_cast<std::size_t>(
+            (column * kScopeTraces + trace) * kScopeLevels + level)];
+    };
+    CHECK_EQUAL(count(0, 1, kScopeLevels - 1), 1U);
+    CHECK_EQUAL(count(1, 1, 0), 1U);
+    CHECK_EQUAL(count(1, 2, kScopeBelow), 1U);
+    CHECK_EQUAL(count(2, 2, kScopeBelow + 255), 0U);
+}
