@@ -19,6 +19,7 @@ from PySide6.QtGui import QMouseEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
+import palette4d
 from palette4d.cli.main import main
 from palette4d.common.text import percent
 from palette4d.grade.answer import Answer, Place
@@ -26,6 +27,7 @@ from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.picks import Pick
 from palette4d.studio import grade_steps, states
 from palette4d.studio.pick_panel import PickPanel
+from palette4d.studio.session import Session
 from palette4d.studio.window import Window
 
 LATER = 1e9
@@ -48,7 +50,9 @@ def pick(qtbot: Any, window: Window, x: int, y: int) -> None:
     """Click a pixel and give it a new colour."""
     qtbot.mouseClick(window.viewer, LEFT, pos=at(window, x, y).toPoint())
     window.inspector.set_colour(np.array(NEW))
-    qtbot.waitUntil(lambda: not window.session.dragging and bool(picks(window)), timeout=20_000)
+    assert not window.session.dragging
+    assert picks(window)
+    qtbot.waitUntil(lambda: not window.session.following, timeout=20_000)
 
 
 def test_a_click_begins_a_pick_and_shows_its_pixel(qtbot: Any, opened: Window) -> None:
@@ -240,11 +244,11 @@ def test_the_answers_buttons_do_what_it_proposes(qtbot: Any, opened: Window, sid
     assert panel.other.button.isVisibleTo(panel)
     assert "0.1 %" in panel.other.button.toolTip()
     qtbot.mouseClick(panel.part.button, LEFT)
-    qtbot.waitUntil(lambda: bool(picks(opened)[0].areas), timeout=20_000)
+    qtbot.waitUntil(lambda: not session.following, timeout=20_000)
     answered(panel, Answer(6, 0.2, 0.02, other=green, hold=green))
     assert not panel.part.isVisibleTo(panel)
     qtbot.mouseClick(panel.other.button, LEFT)
-    qtbot.waitUntil(lambda: len(picks(opened)) == 2, timeout=20_000)
+    qtbot.waitUntil(lambda: not session.following, timeout=20_000)
     assert session.selection == ("p1",)  # its answer is found again
     assert session.save()
     for words in (
@@ -299,22 +303,104 @@ def test_the_matte_of_a_row_of_the_list_is_shown(qtbot: Any, opened: Window) -> 
     assert session.hover == "p1"
 
 
+def waiting_calls(session: Session, qtbot: Any) -> Callable[[], None]:
+    """Keep what threads bring to the window; return what does it at last."""
+    waiting: list[Callable[[], object]] = []
+    posts, session.post = session.post, waiting.append
+
+    def go_on() -> None:
+        qtbot.waitUntil(
+            lambda: any("_work.<locals>.<lambda>" in repr(call) for call in waiting), timeout=20_000
+        )
+        session.post = posts
+        for call in waiting:
+            call()
+        qtbot.waitUntil(lambda: not session.following, timeout=20_000)
+
+    return go_on
+
+
 def test_a_change_while_a_hold_is_learned_is_not_lost(qtbot: Any, opened: Window) -> None:
     pick(qtbot, opened, 40, 30)
     session = opened.session
-    waiting: list[Callable[[], object]] = []
-    posts, session.post = session.post, waiting.append
+    go_on = waiting_calls(session, qtbot)
     grade_steps.hold(session, states.Place(6, 120, 70, 5, (0.3, 0.4, 0.2)))
-    done = "edit_later.<locals>.work.<locals>"
-    qtbot.waitUntil(lambda: any(done in repr(call) for call in waiting), timeout=20_000)
     session.edit(lambda document: document.change_pick("p1", to=(0.1, 0.2, 0.3)))
-    session.post = posts
-    for call in waiting:
-        call()
-    qtbot.waitUntil(lambda: not session.following, timeout=20_000)
+    go_on()
     first, second = picks(opened)
     assert first.to == (0.1, 0.2, 0.3)
     assert second.kind == "hold"
+    assert second.matte is not None
+
+
+def test_what_is_released_is_saved_before_it_is_followed(
+    qtbot: Any, opened: Window, sidecar: Path
+) -> None:
+    twin = Path(shutil.copy(sidecar, sidecar.with_name("twin.p4d.json")))
+    session = opened.session
+    qtbot.mouseClick(opened.viewer, LEFT, pos=at(opened, 40, 30).toPoint())
+    go_on = waiting_calls(session, qtbot)
+    opened.inspector.set_colour(np.array(NEW))
+    assert session.following
+    assert not session.saved
+    session.tick(LATER)
+    (found,) = palette4d.load(sidecar).grade.picks  # what a kill now would leave
+    assert found.to == NEW
+    assert found.path == ()
+    assert session.saved
+    go_on()
+    assert not session.saved
+    session.tick(2 * LATER)
+    frame = str(session.frame)
+    words = ["pick", "--pixel", "40,30", "--frame", frame, "--to", *map(str, NEW)]
+    assert main(["edit", str(twin), *words]) == 0
+    assert sidecar.read_bytes() == twin.read_bytes()
+
+
+def test_a_pick_that_is_undone_or_kept_while_it_is_followed(qtbot: Any, opened: Window) -> None:
+    session = opened.session
+    qtbot.mouseClick(opened.viewer, LEFT, pos=at(opened, 40, 30).toPoint())
+    go_on = waiting_calls(session, qtbot)
+    opened.inspector.set_colour(np.array(NEW))
+    grade_steps.keep_version(session)
+    session.undo()
+    go_on()
+    assert not picks(opened)
+    session.redo()
+    (found,) = picks(opened)
+    assert found.path
+    assert session.document is not None
+    assert session.document.grade.same_edits == ("A",)
+    grade_steps.use_version(session, "A")
+    assert picks(opened) == (found,)
+
+
+def test_edits_that_follow_each_other_are_completed_in_their_order(
+    qtbot: Any, opened: Window, sidecar: Path
+) -> None:
+    twin = Path(shutil.copy(sidecar, sidecar.with_name("twin.p4d.json")))
+    session = opened.session
+    qtbot.mouseClick(opened.viewer, LEFT, pos=at(opened, 40, 30).toPoint())
+    opened.inspector.set_colour(np.array(NEW))
+    grade_steps.hold(session, states.Place(6, 120, 70, 5, (0.3, 0.4, 0.2)))
+    grade_steps.set_range(session, "p1", 2, 9)
+    grade_steps.shape_pick(session, "p1", False, reach=1.0)
+    session.select("p2")
+    grade_steps.reset(session)
+    assert [len(picks(opened)), session.following] == [1, 4]
+    qtbot.waitUntil(lambda: not session.following, timeout=60_000)
+    session.undo()
+    assert session.save()
+    for words in (
+        ["pick", "--pixel", "40,30", "--frame", "6", "--to", *map(str, NEW)],
+        ["hold", "--frame", "6", "--pixel", "120,70", "--box", "5"],
+        ["change", "p1", "--from", "2", "--until", "9"],
+        ["change", "p1", "--reach", "1"],
+        ["unpick", "p2"],
+        ["undo"],
+    ):
+        assert main(["edit", str(twin), *words]) == 0
+    assert sidecar.read_bytes() == twin.read_bytes()
 
 
 def test_alt_click_holds(qtbot: Any, opened: Window) -> None:

@@ -102,13 +102,39 @@ def test_alt_click_is_a_hold_as_the_verb_makes_it(
     QTest.mouseClick(opened.viewer, Qt.MouseButton.LeftButton, alt, at)
     session = opened.session
     qtbot.waitUntil(
-        lambda: session.document is not None and len(session.document.grade.picks) == 1,
+        lambda: (
+            session.document is not None
+            and len(session.document.grade.picks) == 1
+            and not session.following
+        ),
         timeout=30_000,
     )
     assert session.save()
     words = ["edit", str(twin), "hold", "--frame", str(FRAME), "--pixel", f"{place.x},{place.y}"]
     assert main(words) == 0
     assert sidecar.read_bytes() == twin.read_bytes()
+
+
+def test_a_click_before_its_frame_is_read_is_done_when_it_is(
+    window: Window, sidecar: Path, qtbot: Any
+) -> None:
+    window.open_path(str(sidecar))
+    session, viewer = window.session, window.viewer
+    assert session.player is not None
+    while session.player.frame(session.frame) is not None:  # else it was read at once
+        session.go(session.frame + 1)
+    QTest.mouseClick(viewer, Qt.MouseButton.LeftButton, pos=viewer.rect().center())
+    assert session.place is None
+    qtbot.waitUntil(lambda: session.place is not None, timeout=20_000)
+    # Another frame has another picture: there the click is not done.
+    session.select()
+    frame = session.frame
+    session.player.close()
+    session.player._frames.clear()
+    QTest.mouseClick(viewer, Qt.MouseButton.LeftButton, pos=viewer.rect().center())
+    session.go(frame - 1)
+    session.emit("pixels")
+    assert session.place is None
 
 
 def test_the_picture_of_a_drag_is_near_the_exact_one(

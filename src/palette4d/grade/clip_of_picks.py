@@ -59,7 +59,14 @@ class ClipOfPicks:
         The sidecar, for the path of its clip.
     given : path, optional
         The user's clip instead.
+
+    Attributes
+    ----------
+    unread : bool
+        It is read later (`grade.later`): paths and mattes are not known yet.
     """
+
+    unread = False
 
     def __init__(
         self,
@@ -237,19 +244,26 @@ class ClipOfPicks:
             )
         return tuple(map(Message, told))
 
-    def path(self, pick: Pick, progress: Progress | None = None) -> tuple[PathKey, ...]:
+    @property
+    def there(self) -> bool:
+        """Whether the clip can be read."""
+        return self.open() is not None
+
+    def path(
+        self, pick: Pick, given: Sequence[PathKey] = (), progress: Progress | None = None
+    ) -> tuple[PathKey, ...]:
         """Return the path of a pick from its own colour and the given keys of its path.
 
-        Empty if the clip is not there, or if the range is a single frame.
+        Those keys alone if the clip is not there, or if the range is a single frame.
         """
         frames = self._fields["frames"]
         begin, _, _, end = pick.knots(frames["step"])
         span = max(begin, frames["first"]), min(end, frames["last"])
         if span[0] >= span[1] or (clip := self.open()) is None:
-            return tuple(key for key in pick.path if key.given)
+            return tuple(given)
         starts = [(nearest_frame(clip, pick.frame), pick.rgb)]
-        given = [key for key in pick.path if key.given and key.frame != pick.frame]
-        starts += [(nearest_frame(clip, key.frame), key.rgb) for key in given]
+        others = [key for key in given if key.frame != pick.frame]
+        starts += [(nearest_frame(clip, key.frame), key.rgb) for key in others]
         return follow.paths(clip, starts, span, conversion=self._conversion, progress=progress)
 
 

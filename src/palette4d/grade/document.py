@@ -41,6 +41,8 @@ from palette4d.grade.recolouring import F32
 from palette4d.grade.sidecar import OnEdits
 
 PathLike = str | os.PathLike[str]
+#: A clip, or what stands for it.
+OfClip = PathLike | ClipOfPicks
 
 
 class Document:
@@ -293,7 +295,7 @@ class Document:
         self,
         frame: float,
         *,
-        clip: PathLike | None = None,
+        clip: OfClip | None = None,
         progress: Progress | None = None,
         **asked: Unpack[Asked],
     ) -> Pick:
@@ -332,7 +334,7 @@ class Document:
         self,
         frame: float,
         *,
-        clip: PathLike | None = None,
+        clip: OfClip | None = None,
         progress: Progress | None = None,
         **asked: Unpack[When],
     ) -> Pick:
@@ -346,7 +348,7 @@ class Document:
         id: str,
         frame: float,
         *,
-        clip: PathLike | None = None,
+        clip: OfClip | None = None,
         progress: Progress | None = None,
         **where: Unpack[Where],
     ) -> Pick:
@@ -359,12 +361,12 @@ class Document:
         self._take(pick_edits.correct_path(self.grade, of_clip, id, frame, progress, **where))
         return self.grade.pick(id)
 
-    def add_area(self, id: str, area: Area, *, clip: PathLike | None = None) -> Pick:
+    def add_area(self, id: str, area: Area, *, clip: OfClip | None = None) -> Pick:
         """Say that a box or a stroke of a frame belongs to a pick or hold too; it learns again."""
         self._take(pick_edits.add_area(self.grade, self._clip(clip), id, area))
         return self.grade.pick(id)
 
-    def change_pick(self, id: str, *, clip: PathLike | None = None, **changes: Any) -> Pick:
+    def change_pick(self, id: str, *, clip: OfClip | None = None, **changes: Any) -> Pick:
         """Change a pick or hold: any of the attributes of `Pick` but id, kind, path and matte.
 
         `by` gives the new colour as offsets from the picked colour. A new `frame`, `rgb` or range
@@ -374,12 +376,12 @@ class Document:
         self._take(pick_edits.change_pick(self.grade, self._clip(clip), id, **changes))
         return self.grade.pick(id)
 
-    def unpick(self, *ids: str, clip: PathLike | None = None) -> None:
+    def unpick(self, *ids: str, clip: OfClip | None = None) -> None:
         """Remove picks and holds. Without a hold, the others' mattes are learned again."""
         self._take(pick_edits.unpick(self.grade, self._clip(clip), *ids))
 
     def answer(
-        self, id: str, clip: PathLike | None = None, *, tries: bool = True
+        self, id: str, clip: OfClip | None = None, *, tries: bool = True
     ) -> answer.Answer | None:
         """Return what a pick takes of its frame, what else it takes, and what would help.
 
@@ -387,12 +389,12 @@ class Document:
         """
         return answer.of(self.grade, self.grade.pick(id), self._clip(clip), tries=tries)
 
-    def pick_warnings(self, id: str, clip: PathLike | None = None) -> tuple[str, ...]:
+    def pick_warnings(self, id: str, clip: OfClip | None = None) -> tuple[str, ...]:
         """Return what speaks against the clip of a pick or hold, and its colour."""
         return pick_edits.warnings(self.grade, self._clip(clip), id)
 
-    def _clip(self, clip: PathLike | None) -> ClipOfPicks:
-        return ClipOfPicks.of(self.grade, clip)
+    def _clip(self, clip: OfClip | None) -> ClipOfPicks:
+        return clip if isinstance(clip, ClipOfPicks) else ClipOfPicks.of(self.grade, clip)
 
     # ----------------------------------------------------------------------------------- versions
 

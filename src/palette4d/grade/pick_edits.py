@@ -137,7 +137,7 @@ def correct_path(
     """Say where the colour of a pick or hold is at another frame (`Document.correct_path`)."""
     at = _picked(grade, of_clip, frame, where)
     found = corrected(grade.pick(id), at.frame, at.rgb)
-    found = replace(found, path=of_clip.path(found, progress))
+    found = replace(found, path=of_clip.path(found, found.path, progress))
     return _learned(grade, of_clip, found, f"correct {id}: {hex_of(at.rgb)} at frame {frame:g}")
 
 
@@ -145,7 +145,7 @@ def add_area(grade: Grade, of_clip: ClipOfPicks, id: str, area: Area) -> Grade:
     """Say that a box or a stroke belongs to a pick or hold too (`Document.add_area`)."""
     old = grade.pick(id)
     grade.check_frame(area.frame)
-    if of_clip.open() is None:
+    if not of_clip.there:
         raise Palette4dError(
             f"the clip {grade.members['clip']['source']!r} is not there, so that nothing can be "
             f"learned from its pixels; give {Arg('clip')}"
@@ -189,7 +189,7 @@ def change_pick(
         new = replace(new, path=())
     elif follow or (moved and old.path):
         given = tuple(key for key in old.path if key.given and key.frame != old.frame)
-        new = replace(new, path=of_clip.path(replace(new, path=given), progress))
+        new = replace(new, path=of_clip.path(new, given, progress))
     label = f"change {id}: {_changed(old, new)}"
     if old.enabled != new.enabled:
         label = f"{'enable' if new.enabled else 'disable'} {id}"
@@ -223,7 +223,7 @@ def taken(grade: Grade, of_clip: ClipOfPicks, picks: Iterable[Pick]) -> tuple[Gr
             left_out.append(f"{each.id} ({_asked(each)})")
             continue
         if there:
-            found = replace(found, path=of_clip.path(replace(found, path=())))
+            found = replace(found, path=of_clip.path(found))
         grade = _with_matte(grade, of_clip, found)
     return grade, left_out
 
@@ -295,9 +295,9 @@ def _add(
     for area in found.areas:
         of_clip.check_places(area.frame, area.points)
     if asked.get("follow", True):
-        found = replace(found, path=of_clip.path(found, progress))
+        found = replace(found, path=of_clip.path(found, progress=progress))
     for each in grade.picks:
-        if _same(each, found):
+        if _same(replace(each, path=()) if of_clip.unread else each, found):
             off = "" if each.enabled else f", disabled: `enable {each.id}`"
             raise Palette4dError(f"{each.id} is this {found.kind} already{off}; nothing was added")
     found = replace(found, id=new_id("p", [each.id for each in grade.picks]))

@@ -8,6 +8,8 @@ from abc import abstractmethod
 
 from palette4d import _core
 from palette4d.grade.document import Document
+from palette4d.grade.later import Unread
+from palette4d.grade.mattes import Learned
 from palette4d.grade.picks import Pick
 from palette4d.studio.newest import Newest
 from palette4d.studio.session_view import SessionView
@@ -82,6 +84,15 @@ class Drafts(SessionView):
         self._drafted, self._waits = (place, trial, made), None
         self.take_mattes(trial)
         self.emit("draft")
+
+    def unread(self, place: Place) -> Unread:
+        """Return what is known of a pixel before the clip is read."""
+        found = self._drafted
+        if found is None or found[0] is not place:
+            return Unread(place.colour)
+        _, document, made = found
+        text = document.grade.mattes.get(made.matte or "", "")
+        return Unread(place.colour, Learned(made.matte or "", text, made.matte is not None, 0.0))
 
     def _failed(self, place: Place, error: Exception) -> None:
         if self.place is place:

@@ -6,9 +6,10 @@ It knows no toolkit. The verbs are those of `palette4d edit`; tests compare both
 from collections.abc import Callable
 from typing import Any
 
-from palette4d.grade.document import Document
+from palette4d.grade.document import Document, OfClip
 from palette4d.grade.edits import Ramp
 from palette4d.grade.follow import Progress
+from palette4d.grade.later import Unread
 from palette4d.grade.picks import Area, Pick
 from palette4d.plotting import style
 from palette4d.studio import texts
@@ -24,14 +25,14 @@ def handles_of(document: Document, ids: tuple[str, ...]) -> list[str]:
 
 def reset(session: Session) -> None:
     """Reset the selected vertices, and remove the selected stops and picks (`reset`, `unpick`)."""
-    document, clip = session.document, source_of(session)
+    document = session.document
     if document is None:
         return
     picks = [pick for pick in document.grade.picks if pick.id in session.selection]
     ids = [id_ for id_ in session.selection if id_ in document.grade.settings]
     said = texts.REMOVED if picks and not ids else texts.WAS_RESET
 
-    def change(document: Document) -> None:
+    def change(document: Document, clip: OfClip | None) -> None:
         if picks:
             document.unpick(*(pick.id for pick in picks), clip=clip)
         for id_ in ids:
@@ -49,14 +50,14 @@ def reset_all(session: Session) -> None:
 
 def remove(session: Session, ids: list[str]) -> None:
     """Remove picks and holds, and unlock handles (`unpick`, `unlock`)."""
-    document, clip = session.document, source_of(session)
+    document = session.document
     if document is None:
         return
     locks = [id_ for id_ in ids if id_ in document.grade.locks]
     picks = [pick for pick in document.grade.picks if pick.id in ids]
     names = [pick.id for pick in picks]
 
-    def change(document: Document) -> None:
+    def change(document: Document, clip: OfClip | None) -> None:
         if locks:
             document.unlock(*locks)
         if picks:
@@ -102,9 +103,9 @@ def set_ramp(session: Session, ramp: Ramp) -> None:
 
 def enable(session: Session, id_: str, on: bool) -> None:
     """Switch a pick or hold on or off (`enable`, `disable`)."""
-    document, clip = session.document, source_of(session)
+    document = session.document
 
-    def change(document: Document) -> None:
+    def change(document: Document, clip: OfClip | None) -> None:
         document.change_pick(id_, enabled=on, clip=clip)
 
     picks = [] if document is None else [pick for pick in document.grade.picks if pick.id == id_]
@@ -114,9 +115,8 @@ def enable(session: Session, id_: str, on: bool) -> None:
 
 def change_pick(session: Session, id_: str, text: str, **changes: Any) -> None:
     """Change how and when a pick or hold acts, where that reads the clip again (`change`)."""
-    clip = source_of(session)
 
-    def change(document: Document, progress: Progress) -> None:
+    def change(document: Document, clip: OfClip | None, progress: Progress | None) -> None:
         document.change_pick(id_, clip=clip, progress=progress, **changes)
 
     session.edit_later(change, text.format(id=id_))
@@ -130,10 +130,9 @@ def shape_pick(session: Session, id_: str, dragging: bool, **changes: Any) -> No
 
 def hold(session: Session, place: Place) -> None:
     """Hold the colour of a pixel or a box (`hold`); a pick that is selected stays so."""
-    clip = source_of(session)
     chosen = session.picked is not None and session.picked.kind == "pick"
 
-    def make(document: Document, progress: Progress) -> str:
+    def make(document: Document, clip: OfClip | None, progress: Progress | None) -> str:
         if clip is None:
             return document.hold(place.frame, colour=place.colour, any_value=True).id
         pixel = (place.x, place.y)
@@ -141,14 +140,18 @@ def hold(session: Session, place: Place) -> None:
             place.frame, pixel=pixel, box=place.box, clip=clip, progress=progress
         ).id
 
-    session.edit_later(make, texts.HELD, lambda id_: None if chosen else session.select(id_))
+    session.edit_later(
+        make,
+        texts.HELD,
+        lambda id_: None if chosen else session.select(id_),
+        Unread(place.colour),
+    )
 
 
 def add_area(session: Session, id_: str, area: Area) -> None:
     """Add a box or a stroke to a pick or hold (`area`)."""
-    clip = source_of(session)
 
-    def add(document: Document, _: Progress) -> None:
+    def add(document: Document, clip: OfClip | None, _: Progress | None) -> None:
         document.add_area(id_, area, clip=clip)
 
     session.edit_later(add, texts.AREA_ADDED.format(id=id_))
@@ -214,7 +217,7 @@ def _as_one(
     session: Session,
     verb: str,
     ids: list[str],
-    change: Callable[[Document], object],
+    change: Callable[[Document, OfClip | None], object],
     text: str,
     *,
     alone: bool,
@@ -222,14 +225,15 @@ def _as_one(
 ) -> None:
     """Do a change of several as one step; alone it is one step by itself."""
 
-    def whole(document: Document) -> None:
+    def whole(document: Document, clip: OfClip | None, _: Progress | None = None) -> None:
         if alone:
-            change(document)
+            change(document, clip)
             return
         with document.one_step(f"{verb} {' '.join(ids)}"):
-            change(document)
+            change(document, clip)
 
+    said = text.format(ids=", ".join(ids))
     if ids and learns:
-        session.edit_later(lambda document, _: whole(document), text.format(ids=", ".join(ids)))
+        session.edit_later(whole, said)
     elif ids:
-        session.edit(whole, text.format(ids=", ".join(ids)))
+        session.edit(lambda document: whole(document, source_of(session)), said)

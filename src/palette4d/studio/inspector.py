@@ -30,7 +30,7 @@ from PySide6.QtWidgets import (
 from palette4d.colour.oklch import Adjustment, Lch
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import hex_of
-from palette4d.grade.document import Document
+from palette4d.grade.document import Document, OfClip
 from palette4d.grade.edits import RAMPS, as_colour
 from palette4d.grade.follow import Progress
 from palette4d.grade.picks import Area
@@ -437,10 +437,10 @@ class Inspector(QWidget):
             return
         if self.target is None or not self.session.dragging:
             return
-        place, source, to = target.place, grade_steps.source_of(self.session), self._tried
+        place, to = target.place, self._tried
 
-        def pick(document: Document, progress: Progress) -> str:
-            if source is None:
+        def pick(document: Document, clip: OfClip | None, progress: Progress | None) -> str:
+            if clip is None:
                 made = document.pick(place.frame, colour=place.colour, to=to, any_value=True)
             else:
                 made = document.pick(
@@ -448,13 +448,14 @@ class Inspector(QWidget):
                     pixel=(place.x, place.y),
                     box=place.box,
                     to=to,
-                    clip=source,
+                    clip=clip,
                     any_value=True,
                     progress=progress,
                 )
             return made.id
 
-        self.session.edit_later(pick, texts.PICKED, self.session.select)
+        unread = self.session.unread(place)
+        self.session.edit_later(pick, texts.PICKED, self.session.select, unread)
 
     def pick(self, place: Place) -> None:
         """Inspect a pixel of the clip; a new colour for it becomes a pick.

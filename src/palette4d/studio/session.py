@@ -10,28 +10,31 @@ import dataclasses
 import hashlib
 import itertools
 import os
-import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TypeVar
 
 from palette4d.common.errors import Palette4dError, in_words
-from palette4d.grade.document import Document
-from palette4d.grade.edits import Key
+from palette4d.grade import edits
+from palette4d.grade.document import Document, OfClip
+from palette4d.grade.edits import Edit as Step
 from palette4d.grade.follow import Progress
+from palette4d.grade.later import Found, Unread, completed
 from palette4d.media.clip import Clip, open_clip
 from palette4d.media.source_clip import find_clip
 from palette4d.studio import texts
 from palette4d.studio.display import Display
 from palette4d.studio.drafts import Drafts
+from palette4d.studio.following import Follower, Job
 from palette4d.studio.player import Player
 
 Edit = Callable[[Document], object]
 T = TypeVar("T")
 
-#: Seconds between the last edit and its save, and the most while edits go on.
-SAVE_AFTER, SAVE_AT_MOST = 0.4, 1.5
+#: Seconds between the last edit and its save, and the most while edits go on. More would leave too
+#: little of the two seconds within which an edit is on disk.
+SAVE_AFTER, SAVE_AT_MOST = 0.3, 1.0
 #: Seconds until a save that failed is tried again.
 TRY_AGAIN = 5.0
 
@@ -49,8 +52,6 @@ class Session(Drafts):
         How code values of the clip become colours on the screen.
     revision : int
         Rises with every change of what `document` shows.
-    following : int
-        How many edits are still reading the clip.
     """
 
     def __init__(self) -> None:
@@ -66,7 +67,7 @@ class Session(Drafts):
         self.player: Player | None = None
         self.display: Display | None = None
         self.revision = 0
-        self.following = 0
+        self._follower = Follower(self)
 
     # -------------------------------------------------------------------------------------- files
 
@@ -195,6 +196,7 @@ class Session(Drafts):
             self.save()
         if self.player is not None:
             self.player.close()
+        self._follower.clear()
         self._document = self._trial = self._dragged = None
         self._copy = None
         self.clip = self.player = self._stamp = self.probe = self.hover = self.place = None
@@ -232,61 +234,51 @@ class Session(Drafts):
 
     def edit_later(
         self,
-        operation: Callable[[Document, Progress], T],
+        operation: Callable[[Document, OfClip | None, Progress | None], T],
         text: str,
         then: Callable[[T], object] = lambda _: None,
+        unread: Unread | None = None,
     ) -> None:
-        """Do an edit that reads the clip: in a thread on a copy, and then here.
+        """Do an edit that reads the clip: at once without that, and complete it in a thread.
 
-        What is being dragged stays visible until then. `then` gets the operation's result. If the
-        user has changed the same thing meanwhile, the edit is done again after that.
+        `then` gets the operation's result. `unread` has what is known of the clip.
         """
-        document, dragged = self._document, self._dragged
+        document, clip = self._document, self.clip
         if document is None:
             return
-        trial = Document(document.grade)
+        before, made = document.grade, list[T]()
 
-        def say(done: int, total: int) -> None:
-            words = texts.FOLLOWING.format(done=done, total=total)
-            self.post(lambda: self.say(words))
+        def at_once(document: Document) -> None:
+            first = None if clip is None else unread or Unread()
+            made.append(operation(document, first, None))
 
-        def finish(result: T) -> None:
-            self.following -= 1
-            if self._document is document and not _applies(trial, document):
-                self.edit_later(operation, text, then)
-            elif self._document is document:
-                meanwhile = self._dragged if dragged is None else None
-                self.take_mattes(trial)
-                self.edit(repeat, text)
-                if meanwhile is not None:
-                    self.drag(*meanwhile)
-                then(result)
-            self.emit("followed")
+        self.edit(at_once, text)
+        if not made:
+            return
+        then(made[0])
+        done = document.history.done
+        step = edits.difference(before.state, document.grade.state).undoable()
+        if clip is not None and step.changes and done[-1].changes == step.changes:
+            job = Job(operation, clip.source, text, before, document.grade, done[-1])
+            self._follower.add(job)
 
-        def repeat(own: Document) -> None:
-            for step in trial.history.done:
-                own.apply(step)
+    @property
+    def following(self) -> int:
+        """How many edits are still reading the clip."""
+        return len(self._follower)
 
-        def fail(error: Exception) -> None:
-            self.following -= 1
-            if dragged is not None:
-                self.cancel()
-            self._changed()  # a view may show what was wanted
-            self.report(error)
-            self.emit("followed")
-
-        def work() -> None:
-            try:
-                result = operation(trial, say)
-            except Exception as error:  # whatever fails, the window stays
-                failed = error
-                self.post(lambda: fail(failed))
-            else:
-                self.post(lambda: finish(result))
-
-        self.following += 1
-        self.say(texts.LEARNING)
-        threading.Thread(target=work, name="palette4d edit", daemon=True).start()
+    def complete(self, steps: tuple[Step, Step], found: Found, mattes: Mapping[str, str]) -> None:
+        """Put what was found in the clip into a step, and go on with what is being dragged."""
+        document, dragged = self._document, self._dragged
+        assert document is not None
+        document.grade, document.history = completed(
+            document.grade, document.history, steps, found, mattes
+        )
+        self._note_edit()
+        if dragged is None:
+            self._changed()
+        else:
+            self.drag(*dragged)
 
     def take_mattes(self, trial: Document) -> None:
         """Have the mattes that were learned for a copy of the document."""
@@ -351,7 +343,7 @@ class Session(Drafts):
     def tick(self, now: float | None = None) -> None:
         """Save what is due, and take over what another program wrote; call it often."""
         document = self._document
-        if document is None or document.path is None or self._dragged is not None:
+        if document is None or document.path is None:
             return
         now = time.monotonic() if now is None else now
         if now < self._next_try:
@@ -361,7 +353,7 @@ class Session(Drafts):
         )
         if due:
             self.save(now)
-        elif self._edited_at is None and _stamp(document.path) != self._stamp:
+        elif self.saved and not self.dragging and _stamp(document.path) != self._stamp:
             self._reload()
 
     def save(self, now: float | None = None) -> bool:
@@ -385,7 +377,10 @@ class Session(Drafts):
             self.say(texts.SAVED_NOW)
         if document.grade.state != before:
             self.say(texts.MERGED)
-            self._changed()
+            if self._dragged is None:
+                self._changed()
+            else:
+                self.drag(*self._dragged)
         self.emit("status")
         return True
 
@@ -477,12 +472,3 @@ def _stamp(path: Path) -> tuple[int, int, int] | None:
     except OSError:
         return None
     return found.st_mtime_ns, found.st_size, found.st_ino
-
-
-def _applies(trial: Document, document: Document) -> bool:
-    """Return whether what the steps of a copy change is in the document as they found it."""
-    found: dict[Key, object] = {}
-    for change in (change for step in trial.history.done for change in step.changes):
-        found.setdefault(change.key, change.before)
-    state = document.grade.state
-    return all(state.get(key) == before for key, before in found.items())

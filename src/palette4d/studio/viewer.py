@@ -69,6 +69,9 @@ class Viewer(QWidget):
         self._pan_from = QPointF()
         self.pointer: QPointF | None = None
         self.shows_brush = False  #: the pointer is a brush
+        #: a click or a box before its frame is read: the frame, two pixels, and whether it holds
+        self._clicked: tuple[int, tuple[int, int], tuple[int, int], bool] | None = None
+        self._lacks = False  #: the frame's pixels were wanted, and not there
         self._resting = QTimer(self)
         self._resting.setSingleShot(True)
         self._resting.timeout.connect(self._read_around)
@@ -110,7 +113,7 @@ class Viewer(QWidget):
 
     def _clip_changed(self) -> None:
         self.picture, self.images, self.shown_frame, self.problem = None, {}, None, ""
-        self.zoom = None
+        self.zoom, self._clicked = None, None
         self._clips += 1
         self.preview.forget()
         self.read_frame()
@@ -135,9 +138,10 @@ class Viewer(QWidget):
 
     def _pixels_arrived(self) -> None:
         """Show the frame, unless another frame's pixels have arrived."""
-        if self.shown_frame != self.session.frame or self.session.playing:
+        if self._lacks or self.shown_frame != self.session.frame or self.session.playing:
             self.refresh()
             self._probe_again()
+        self._do_click()
 
     def refresh(self) -> None:
         """Ask for the picture of now; while playing, the playback chooses the pictures."""
@@ -145,6 +149,7 @@ class Viewer(QWidget):
             self.update()
             return
         request = self.request()
+        self._lacks = request is None
         if request is not None:
             self.problem = ""
             self.preview.ask(request)
@@ -420,13 +425,32 @@ class Viewer(QWidget):
             if self.on_area is not None:
                 self.on_area(Area(self.session.frame, drawn, self.stroke_radius))
         if doing in ("pick", "box") and press is not None:
-            place = self.place(press, event.position() if doing == "box" else press)
-            if place is not None:
-                hold = event.modifiers() & HOLD_KEYS or self.session.tool == "hold"
-                act = self.on_hold if hold else self.on_pick
-                if act is not None:
-                    act(place)
+            hold = event.modifiers() & HOLD_KEYS or self.session.tool == "hold"
+            self._click(press, event.position() if doing == "box" else press, hold=bool(hold))
         self.update()
+
+    def _click(self, start: QPointF, end: QPointF, *, hold: bool) -> None:
+        """Pick or hold what was clicked; a click that comes before its frame is read is kept."""
+        first, last = self.pixel_at(start), self.pixel_at(end) or self.pixel_at(start)
+        if first is not None and last is not None:
+            self._clicked = self.session.frame, first, last, hold
+            self._do_click()
+
+    def _do_click(self) -> None:
+        """Do the click that is kept, if its frame is there."""
+        session, clicked = self.session, self._clicked
+        if clicked is None or session.player is None:
+            return
+        frame, first, last, hold = clicked
+        waits = frame == session.frame and frame not in session.player.errors
+        if waits and session.player.frame(frame) is None:
+            session.say(texts.READING)
+            return
+        self._clicked = None
+        place = place_between(session, first, last) if waits else None
+        act = self.on_hold if hold else self.on_pick
+        if place is not None and act is not None:
+            act(place)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         """A second click is a click."""

@@ -397,7 +397,8 @@ class Window(QMainWindow):
         self.says.setToolTip(theme.plain(status.text))
         facts = []
         if session.path is not None and document is not None:
-            facts = [session.path.name, texts.SAVED if session.saved else texts.UNSAVED]
+            saved = session.saved and not session.dragging
+            facts = [session.path.name, texts.SAVED if saved else texts.UNSAVED]
             facts.append(texts.HANDLES.format(count=len(document.grade.core.polytope.vertex_ids)))
             picks = sum(kind == "pick" for kind, _ in document.grade.state)
             if picks:

@@ -1,0 +1,163 @@
+"""Edits of picks that read the clip later: made at once, and completed when it is read.
+
+An edit with `Unread` for its clip leaves out what only the clip can tell: the path, and the matte.
+The same edit with the clip gives both. `completed` puts them into the step that was made at once,
+whatever was done, undone or kept as a version since.
+"""
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from palette4d.grade import edits
+from palette4d.grade.clip_of_picks import DIGITS, ClipOfPicks
+from palette4d.grade.edits import Change, Colour, Edit, Key, State
+from palette4d.grade.follow import Progress
+from palette4d.grade.grade import Grade
+from palette4d.grade.history import History
+from palette4d.grade.mattes import Display, Learned
+from palette4d.grade.picks import PathKey, Pick
+
+#: A pick before and after the clip was read.
+Found = tuple[tuple[Pick, Pick], ...]
+#: What a path and a matte depend on. A pick that differs in one of these is another one.
+_INPUTS = ("kind", "frame", "rgb", "pixel", "box", "areas", "whole_hue")
+
+
+class Unread(ClipOfPicks):
+    """A clip that is read later: nothing is learned or followed.
+
+    Parameters
+    ----------
+    colour : 3 floats, optional
+        The colour of the picked pixel, in the palette's code values.
+    learned : Learned, optional
+        What was learned for a new pick already.
+    """
+
+    unread = True
+
+    def __init__(self, colour: Iterable[float] = (), learned: Learned | None = None) -> None:
+        super().__init__({}, None, None)
+        self._colour, self._learned = tuple(colour), learned
+
+    @property
+    def there(self) -> bool:
+        """True: an edit that needs the clip is tried with it later."""
+        return True
+
+    def colour(self, frame: float, pixel: tuple[float, float], box: int) -> Colour:
+        """Return the colour that is known."""
+        return edits.as_colour([round(value, DIGITS) for value in self._colour])
+
+    def check_places(self, frame: float, pixels: Iterable[tuple[float, float]]) -> None:
+        """Check nothing yet."""
+
+    def learn(self, pick: Pick, holds: Sequence[Pick], display: Display | None) -> Learned | None:
+        """Return what is known; else the pick keeps its matte."""
+        new = pick.kind == "pick" and pick.matte is None
+        return self._learned if new else None
+
+    def path(
+        self, pick: Pick, given: Sequence[PathKey] = (), progress: Progress | None = None
+    ) -> tuple[PathKey, ...]:
+        """Return the path that the pick has."""
+        return pick.path
+
+
+def found_in(clip: Grade, unread: Grade) -> Found:
+    """Return the picks that an edit with the clip made different from those without it."""
+    both = ((unread.state.get(key), value) for key, value in clip.of_kind("pick").items())
+    return tuple((old, new) for old, new in both if old is not None and old != new)
+
+
+def completed(
+    grade: Grade,
+    history: History,
+    steps: tuple[Edit, Edit],
+    found: Found,
+    mattes: Mapping[str, str],
+) -> tuple[Grade, History]:
+    """Return a grade and its steps where a step has what was found in the clip.
+
+    Parameters
+    ----------
+    grade, history : Grade and History
+        As they are now: the step may be done or undone.
+    steps : (Edit, Edit)
+        The step that was made at once, and that of the same edit with the clip. Without the first
+        one in the history, what is found becomes a step of its own.
+    found : tuple of (Pick, Pick)
+        `found_in`.
+    mattes : mapping of str to str
+        Texts of the mattes that were learned.
+    """
+    grade, (step, like) = grade.with_mattes(mattes), steps
+    line, done = [*history.done, *reversed(history.undone)], len(history.done)
+    at = max((k for k, each in enumerate(line) if _same(each, step)), default=None)
+    is_done = at is None or at < done
+    now = (with_found if is_done else _versions)(grade.state, found)
+    if at is None:
+        return grade.with_state(now), history.with_step(
+            edits.difference(grade.state, now, step.label).undoable()
+        )
+    before: State = grade.state
+    for each in reversed(line[at:done]):
+        before = each.inverse().apply(before)
+    for each in line[done:at]:
+        before = each.apply(before)
+    state, orders = before, [like, *line[at + 1 :]]
+    for k, order in enumerate(orders, at):
+        before = line[k].apply(before)
+        after = with_found(before, found)
+        line[k] = replace(line[k], changes=_changes(state, after, order))
+        state = after
+    line[at] = replace(line[at], label=like.label)
+    kept = [each for each in line[:done] if each.changes]
+    undone = [each for each in line[done:] if each.changes]
+    return grade.with_state(now, grade.label), History(tuple(kept), tuple(reversed(undone)))
+
+
+def with_found(state: State, found: Found) -> dict[Key, Any]:
+    """Return a state whose picks have what was found for them, where nothing else changed it."""
+    result = _versions(state, found)
+    for old, new in found:
+        own = result.get(("pick", old.id))
+        if own is None:
+            continue
+        changes = {
+            field.name: getattr(new, field.name)
+            for field in dataclasses.fields(old)
+            if getattr(old, field.name) != getattr(new, field.name)
+        }
+        same = {*_INPUTS, *changes}
+        if all(getattr(own, name) == getattr(old, name) for name in same):
+            result["pick", old.id] = replace(own, **changes)
+    return result
+
+
+def _same(one: Edit, other: Edit) -> bool:
+    """Return whether two steps change the same, in any order."""
+    first, second = ({change.key: change for change in each.changes} for each in (one, other))
+    return first == second
+
+
+def _changes(before: State, after: State, order: Edit) -> tuple[Change, ...]:
+    """Return the changes between two states, those of a step in its order."""
+    places = {change.key: k for k, change in enumerate(order.changes)}
+    new = edits.difference(before, after).undoable().changes
+    return tuple(sorted(new, key=lambda change: places.get(change.key, len(places))))
+
+
+def _versions(state: State, found: Found) -> dict[Key, Any]:
+    """Return a state whose versions have what was found, where they hold the very same picks."""
+    result = dict(state)
+    for (kind, name), value in state.items():
+        if kind == "version":
+            new = {
+                ("pick", old.id): new for old, new in found if value.get(("pick", old.id)) == old
+            }
+            if new:
+                result["version", name] = {**value, **new}
+    return result

@@ -1,0 +1,141 @@
+"""Edits that read the clip: made at once, and completed beside the views' thread.
+
+What a gesture asks for is in the document when it ends, with a path and a matte that are not known
+yet; so it is saved at once. A thread does the same edit with the clip, one after another, and what
+it found is put into the step. It knows no toolkit.
+"""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from palette4d.grade import edits, later
+from palette4d.grade.document import Document, OfClip
+from palette4d.grade.edits import Edit
+from palette4d.grade.follow import Progress
+from palette4d.grade.grade import Grade
+from palette4d.studio import texts
+from palette4d.studio.session_events import words_of
+
+if TYPE_CHECKING:
+    from palette4d.studio.session import Session
+
+#: An edit of a document with its clip, or with an `Unread` one.
+ClipEdit = Callable[[Document, OfClip | None, Progress | None], object]
+#: Seconds between two words about the progress.
+SAY_EVERY = 0.1
+
+
+@dataclass(frozen=True)
+class Job:
+    """An edit that is made, and not completed yet.
+
+    Attributes
+    ----------
+    edit : callable
+        Does it.
+    clip : str
+        The clip.
+    text : str
+        What it did, for people.
+    before, after : Grade
+        Around it, as it was made.
+    step : Edit
+        Its step in the history.
+    """
+
+    edit: ClipEdit
+    clip: str
+    text: str
+    before: Grade
+    after: Grade
+    step: Edit
+
+    def with_found(self, found: later.Found, done: Grade) -> "Job":
+        """Return the job after an earlier one has completed picks that this one knows too."""
+        before, after = (
+            grade.with_state(later.with_found(grade.state, found)).with_mattes(done.mattes)
+            for grade in (self.before, self.after)
+        )
+        step = edits.difference(before.state, after.state, self.step.label).undoable()
+        return replace(self, before=before, after=after, step=step)
+
+
+class Follower:
+    """Completes edits of a session in a thread, in the order in which they were made."""
+
+    def __init__(self, session: "Session") -> None:
+        """Wait for edits."""
+        self._session = session
+        self._jobs: deque[Job] = deque()
+
+    def __len__(self) -> int:
+        """How many edits are not completed yet."""
+        return len(self._jobs)
+
+    def add(self, job: Job) -> None:
+        """Complete this edit when those before it are."""
+        self._jobs.append(job)
+        if len(self._jobs) == 1:
+            self._begin()
+
+    def clear(self) -> None:
+        """Forget all: there is another document."""
+        self._jobs.clear()
+
+    def _begin(self) -> None:
+        job, session = self._jobs[0], self._session
+        session.say(texts.LEARNING)
+        threading.Thread(
+            target=lambda: self._work(job), name="palette4d follower", daemon=True
+        ).start()
+
+    def _work(self, job: Job) -> None:
+        """Do an edit with its clip; runs in a thread."""
+        session, said = self._session, 0.0
+        trial = Document(job.before)
+
+        def say(done: int, total: int) -> None:
+            nonlocal said
+            if time.monotonic() - said >= SAY_EVERY:
+                said = time.monotonic()
+                words = texts.FOLLOWING.format(done=done, total=total)
+                session.post(lambda: session.say(words) if self._is_first(job) else None)
+
+        try:
+            job.edit(trial, job.clip, say)
+        except Exception as error:  # whatever fails, the window stays
+            failed = error
+            session.post(lambda: self._failed(job, failed))
+        else:
+            session.post(lambda: self._done(job, trial))
+
+    def _is_first(self, job: Job) -> bool:
+        """Return whether it is still wanted: another document has other edits."""
+        return bool(self._jobs) and self._jobs[0] is job
+
+    def _done(self, job: Job, done: Document) -> None:
+        if not self._is_first(job):
+            return
+        found = later.found_in(done.grade, job.after)
+        self._jobs.popleft()
+        self._jobs = deque(each.with_found(found, done.grade) for each in self._jobs)
+        like = done.history.done[-1] if done.history.done else job.step
+        self._session.complete((job.step, like), found, done.grade.mattes)
+        self._session.say(job.text)
+        self._next()
+
+    def _failed(self, job: Job, error: Exception) -> None:
+        if not self._is_first(job):
+            return
+        self._jobs.popleft()
+        self._session.say(texts.NOT_FOLLOWED.format(why=words_of(error)), "error")
+        self._next()
+
+    def _next(self) -> None:
+        if self._jobs:
+            self._begin()
+        self._session.emit("followed")
