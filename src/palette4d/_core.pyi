@@ -205,10 +205,15 @@ class FramePicks:
     @property
     def left(self) -> F32 | None: ...
 
-def pick_points(
-    colours: ArrayLike, display: tuple[float, float, Sequence[float]] | None = ...
+def pick_distances(
+    colours: ArrayLike,
+    picked: Sequence[float],
+    display: tuple[float, float, Sequence[float]] | None = ...,
 ) -> F64:
-    """Return (n, 3) points of (n, 3) palette code values: two of saturation, and lightness."""
+    """Return the (n,) distances of (n, 3) palette code values from a picked colour in pick space.
+
+    Its coordinates are two of saturation, and lightness times 0.4.
+    """
 
 def hue_matte(picked: Sequence[float]) -> U8:
     """Return the (96, 96, 16) log odds of all colours of a display colour's hue, 0 to 126."""

@@ -77,6 +77,32 @@ def test_a_pick_that_floods_is_warned_of(monkeypatch: pytest.MonkeyPatch) -> Non
     assert not answer(document_of(monkeypatch, wall)).floods
 
 
+@pytest.mark.parametrize(
+    ("gap", "elsewhere", "proposed"), [(3, False, True), (12, False, False), (3, True, False)]
+)
+def test_a_proposed_box_adds_the_rest_of_the_thing(
+    monkeypatch: pytest.MonkeyPatch, gap: int, elsewhere: bool, proposed: bool
+) -> None:
+    """The dark part behind a narrow line may be the thing's, if nothing else has its colour."""
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = RED
+    picture[30:90, 60 + gap : 100] = 0.35 * RED
+    if elsewhere:
+        picture[30:90, 150:190] = 0.35 * RED
+    document = document_of(monkeypatch, picture)
+    part = answer(document).part
+    assert (part is not None) == proposed
+    if part is None:
+        return
+    assert 60 <= part.pixel[0] < 100
+    assert part.share == pytest.approx(0.092, abs=0.005)
+    document.add_area("p1", Area(0, (part.pixel,), part.box / 2))
+    again = document.answer("p1")
+    assert again is not None
+    assert again.share == pytest.approx(part.left, abs=0.01)
+    assert again.share > 0.17
+
+
 @pytest.mark.parametrize(("columns", "proposed"), [(2, True), (6, False)])
 def test_a_proposed_hold_costs_the_thing_little(
     monkeypatch: pytest.MonkeyPatch, columns: int, proposed: bool

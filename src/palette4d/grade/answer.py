@@ -1,7 +1,7 @@
-"""What a pick takes of its frame, what else it takes, and which gesture would help.
+"""The answer to a pick: the pixels that it takes, others that it also takes, and what would help.
 
-Input: a grade with a pick, and its clip. Output: an `Answer`. Proposed holds and boxes have been
-tried.
+Input: a grade with a pick, and its clip. Output: an `Answer`. Each proposed hold or box has been
+tried on the frame.
 """
 
 from __future__ import annotations
@@ -25,17 +25,19 @@ from palette4d.media.source_clip import nearest_frame
 F32 = NDArray[np.float32]
 B = NDArray[np.bool_]
 
-#: The frame is reduced to about this width, in pixels.
+#: The frame is reduced to about this width, in pixels: more take longer and show nothing more.
 WIDTH = 480
-#: A pixel that gets this share of the change is taken.
+#: A pixel that gets at least this share of the change is taken.
 TAKEN = 0.25
-#: Shares of the frame that are worth a word: other things that are taken, and parts that are not.
+#: Least shares of the frame to report: of other things that are taken, and of a part of the thing
+#: that is not. Smaller ones are seldom seen.
 OTHERS, PART = 0.005, 0.01
-#: A hold helps if it halves what else is taken, and costs the picked thing less than this share.
+#: A hold is proposed if it halves what else is taken, and costs the picked thing less than this
+#: share of its pixels.
 COST = 0.1
-#: A pick may be more than what was clicked on if most of its colours are farther than FAR from the
-#: picked one (in saturation, and 0.4 of lightness); if it is as large as LARGE, or covers three
-#: borders, from SOME of them on.
+#: A pick may take more than one thing if more than MOST of its pixels are farther than FAR from the
+#: picked colour (in pick space); more than SOME if it takes more than LARGE of the frame, or covers
+#: three of its borders, as skies and walls do.
 FAR, MOST, SOME, LARGE = 0.2, 0.6, 0.1, 0.4
 
 
@@ -52,7 +54,8 @@ class Place:
     share : float
         Share of the frame's pixels that it stands for.
     left : float
-        With the gesture: for a hold, what is still taken elsewhere; for a box, what the pick takes.
+        The share after the gesture: with a hold, of what is still taken elsewhere; with a box, of
+        what the pick takes.
     """
 
     pixel: tuple[int, int]
@@ -70,11 +73,11 @@ class Answer:
     ----------
     frame : int
     share : float
-        Share of the frame's pixels that get at least a quarter of the change.
+        Share of the frame's pixels that are taken: they get at least a quarter of the change.
     others : float
-        The same for pixels that are not connected with what was clicked on.
+        Share of pixels that are taken but not connected with the picked place.
     other : Place or None
-        The largest of these.
+        The largest of these regions.
     hold : Place or None
         A hold that helps.
     part : Place or None
@@ -96,44 +99,48 @@ class Answer:
 
     def lines(self, id: str) -> list[str]:
         """Return the answer for people, and the gestures that help as arguments of `edit`."""
-        found = [f"takes {percent(self.share)} of frame {self.frame}"]
+        lines = [f"takes {percent(self.share)} of frame {self.frame}"]
+
+        def place(region: Place) -> str:
+            return f"{region.pixel[0]},{region.pixel[1]}"
+
         if self.other is not None:
-            x, y = self.other.pixel
-            found.append(
+            lines.append(
                 f"also takes {percent(self.others)} elsewhere, most of it {hex_of(self.other.rgb)} "
-                f"at {x},{y}"
+                f"at {place(self.other)}"
             )
         if self.other is not None and self.hold is None and self.tried:
-            found.append(
+            lines.append(
                 "  no hold there keeps it and spares the rest: hold another part of it, or change "
                 f"{id} --reach -1"
             )
         if self.hold is not None:
-            x, y = self.hold.pixel
-            found.append(
-                f"  to keep it: hold --frame {self.frame} --pixel {x},{y} --box {self.hold.box} "
-                f"(leaves {percent(self.hold.left)})"
+            lines.append(
+                f"  to keep it: hold --frame {self.frame} --pixel {place(self.hold)} "
+                f"--box {self.hold.box} (leaves {percent(self.hold.left)})"
             )
         if self.part is not None:
-            x, y = self.part.pixel
-            found.append(
-                f"does not take {hex_of(self.part.rgb)} at {x},{y}, "
+            lines.append(
+                f"does not take {hex_of(self.part.rgb)} at {place(self.part)}, "
                 f"{percent(self.part.share)} of the frame"
             )
-            found.append(
-                f"  if it belongs to it: area {id} --frame {self.frame} --pixel {x},{y} "
-                f"--box {self.part.box} (then takes {percent(self.part.left)})"
+            lines.append(
+                f"  if it belongs to the thing: area {id} --frame {self.frame} "
+                f"--pixel {place(self.part)} --box {self.part.box} "
+                f"(then takes {percent(self.part.left)})"
             )
         if self.floods:
-            found.append(
+            lines.append(
                 "  warning: this may be more than one thing. Look at its matte (render --output "
                 f"pick:{id}); a hold on what must stay, or a lower --reach, takes less"
             )
-        return found
+        return lines
 
 
-def of(grade: Grade, pick: Pick, of_clip: ClipOfPicks, *, tries: bool = True) -> Answer | None:
-    """Return the answer for a pick; None where the clip is not there.
+def answer_to(
+    grade: Grade, pick: Pick, of_clip: ClipOfPicks, *, tries: bool = True
+) -> Answer | None:
+    """Return the answer to a pick; None where the clip is not there.
 
     Without `tries` no hold and no box are proposed, which takes most of the time.
     """
@@ -150,23 +157,23 @@ def of(grade: Grade, pick: Pick, of_clip: ClipOfPicks, *, tries: bool = True) ->
     own = _connected(taken, seeds)
     others = taken & ~own if seeds.any() else np.zeros_like(taken)
     beside = float(others.mean())
-    far, large = view.far(pick, own), share > LARGE or _borders(own) >= 3
-    floods = far > (SOME if large else MOST)
-    found = Answer(frame, share, beside, floods=floods, tried=tries)
+    large = share > LARGE or _borders(own) >= 3
+    floods = view.far(pick, own) > (SOME if large else MOST)
+    answer = Answer(frame, share, beside, floods=floods, tried=tries)
     if beside > OTHERS:
-        found = replace(found, other=view.place(others))
+        answer = replace(answer, other=view.place(others))
         if tries:
-            found = replace(found, hold=_hold(grade, pick, of_clip, view, own, others))
-    part = view.beside(pick, own, taken)
+            answer = replace(answer, hold=_hold(grade, pick, of_clip, view, own, others))
+    part = view.beside(grade, pick, own, taken)
     if tries and part.mean() > max(PART, 0.1 * share) and not pick.whole_hue:
-        found = replace(found, part=_part(grade, pick, of_clip, view, part, beside))
-    return found
+        answer = replace(answer, part=_part(grade, pick, of_clip, view, part, beside))
+    return answer
 
 
 def _hold(
     grade: Grade, pick: Pick, of_clip: ClipOfPicks, view: _View, own: B, others: B
 ) -> Place | None:
-    """Return a hold on the largest other thing, if it helps and spares the picked thing."""
+    """Return a hold on the largest other region, if it helps and spares the picked thing."""
     place = view.place(others)
     try:
         trial, _ = pick_edits.hold(
@@ -219,52 +226,39 @@ class _View:
         return cls(frame, every, shown, real, display_curve(grade.encoding))
 
     def taken(self, grade: Grade, pick: Pick) -> B:
-        """Return which pixels get at least a quarter of a pick's change."""
-        picks = grade.core.pick_matte_at(pick.id, self.frame)
-        return self._drawn(picks) & self.real
-
-    def _drawn(self, picks: _core.FramePicks) -> B:
+        """Return the pixels that get at least a quarter of a pick's change."""
         # Any palette will do: none of its colours moves.
-        corner = np.zeros((1, 3))
-        faces = np.zeros((0, 3), np.int32)
-        drawn = _core.Recolourer(corner, corner, faces, picks=picks).apply(
-            self.rgb, precision="single"
-        )
-        return np.asarray((drawn - self.rgb)[..., 0] > TAKEN)
+        corner, faces = np.zeros((1, 3)), np.zeros((0, 3), np.int32)
+        matte = grade.core.pick_matte_at(pick.id, self.frame)
+        drawing = _core.Recolourer(corner, corner, faces, picks=matte)
+        drawn = drawing.apply(self.rgb, precision="single")
+        return np.asarray((drawn - self.rgb)[..., 0] > TAKEN) & self.real
 
     def far(self, pick: Pick, own: B) -> float:
-        """Return the share of a region whose colours are far from the picked one."""
+        """Return the share of a region's pixels whose colours are far from the picked one."""
         if not own.any():
             return 0.0
-        points = _core.pick_points(self.rgb[own], self.display)
-        away = points - _core.pick_points([pick.rgb], self.display)
-        return float((np.linalg.norm(away * (1, 1, 0.4), axis=1) > FAR).mean())
+        distances = _core.pick_distances(self.rgb[own], pick.rgb, self.display)
+        return float((distances > FAR).mean())
 
-    def beside(self, pick: Pick, own: B, taken: B) -> B:
+    def beside(self, grade: Grade, pick: Pick, own: B, taken: B) -> B:
         """Return the largest part of the pick's hue that is connected with it and not taken."""
         from scipy import ndimage
 
-        shown = _shown(pick.rgb, self.display)
-        odds = _core.hue_matte(shown).astype(np.float32)
-        cone = np.where(odds == 0, 0, 1 / (1 + np.exp((63 - odds) * (6 / 63))))
-        given = [(pick.rgb, (1.0, 1.0, 1.0), 1.0, cone.astype(np.float32))]
-        picks = _core.FramePicks(given, display=self.display)
-        left = self._drawn(picks) & self.real & ~taken
-        left = ndimage.binary_opening(left, iterations=2)
-        labels, count = ndimage.label(left)
-        if not count or not own.any():
+        whole_hue = grade.put("pick", pick.id, replace(pick, matte=None))
+        rest = self.taken(whole_hue, pick) & ~taken
+        labels, count = ndimage.label(ndimage.binary_opening(rest, iterations=2))
+        sizes = np.bincount(labels.ravel(), minlength=1)
+        touching = np.zeros(count + 1, bool)
+        touching[labels[ndimage.binary_dilation(own, iterations=4)]] = True
+        touching[0] = False
+        if not touching.any():
             return np.zeros_like(own)
-        touching = np.unique(labels[ndimage.binary_dilation(own, iterations=4)])
-        sizes = np.bincount(labels.ravel())
-        sizes[0] = 0
-        kept = [n for n in touching.tolist() if n]
-        if not kept:
-            return np.zeros_like(own)
-        return np.asarray(labels == max(kept, key=lambda n: int(sizes[n])))
+        return np.asarray(labels == np.where(touching, sizes, 0).argmax())
 
     def seeds(self, pick: Pick, frame: int) -> B:
         """Return the pixels that the user marked in a frame."""
-        found = np.zeros(self.real.shape, bool)
+        marked = np.zeros(self.real.shape, bool)
         areas = [area for area in pick.areas if area.frame == frame]
         if pick.pixel is not None and round(pick.frame) == frame:
             areas.append(Area(frame, (pick.pixel,), (pick.box or 1) / 2))
@@ -272,11 +266,11 @@ class _View:
             for x, y in area.points:
                 half = max(area.radius / self.every, 0.5)
                 row, column = y / self.every, x / self.every
-                found[
+                marked[
                     max(0, int(row - half)) : int(row + half) + 1,
                     max(0, int(column - half)) : int(column + half) + 1,
                 ] = True
-        return found
+        return marked
 
     def place(self, mask: B) -> Place:
         """Return the middle of a mask's largest part, and a box that lies in it."""
@@ -286,17 +280,8 @@ class _View:
         return Place(pixel, box * self.every, rgb, float(largest.mean()))
 
 
-def _shown(rgb: Colour, display: Display | None) -> Colour:
-    """Return the display code values of a colour."""
-    if display is None:
-        return rgb
-    start, end, values = display
-    codes = np.linspace(start, end, len(values))
-    return as_colour(np.interp(rgb, codes, values).tolist())
-
-
 def _connected(mask: B, seeds: B) -> B:
-    """Return the parts of a mask that are connected with seeds, across gaps of a pixel or two."""
+    """Return the regions of a mask that are connected with seeds, across gaps of a pixel or two."""
     from scipy import ndimage
 
     labels, _ = ndimage.label(ndimage.binary_dilation(mask))

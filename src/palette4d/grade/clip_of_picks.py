@@ -36,8 +36,8 @@ DIGITS = 6
 OTHER_CLIP = 0.16
 #: A colour of another clip is here if a connected region of this share of a frame has it.
 LEAST_REGION = 5e-4
-#: Differences of saturation, twice, and of lightness, within which two clips' colours are the same.
-SAME_COLOUR = (0.05, 0.05, 0.15)
+#: Distance in pick space within which two clips' colours are the same thing's.
+SAME_COLOUR = 0.06
 
 #: The advice for another clip than the palette's.
 OWN_CLIP = Message(
@@ -143,16 +143,16 @@ class ClipOfPicks:
         if not 1 <= box <= most:
             raise Palette4dError(f"found a box of {box} pixels, expected 1 to {most}")
         pixels = clip.straight_colours(clip.read(int(frame)))
-        left, top = (max(0, math.floor(at) - (box - 1) // 2) for at in (x, y))
-        right, bottom = (math.floor(at) + box // 2 + 1 for at in (x, y))
-        found = pixels[top:bottom, left:right].reshape(-1, 3).astype(np.float64)
-        found = found[np.isfinite(found).all(axis=1)]
-        if not len(found):
+        left, top = (max(0, math.floor(place) - (box - 1) // 2) for place in (x, y))
+        right, bottom = (math.floor(place) + box // 2 + 1 for place in (x, y))
+        colours = pixels[top:bottom, left:right].reshape(-1, 3).astype(np.float64)
+        colours = colours[np.isfinite(colours).all(axis=1)]
+        if not len(colours):
             raise Palette4dError(
                 f"the pixel {x:g},{y:g} of frame {frame:g} has no colour: it is transparent or not "
                 f"a finite number. Pick another pixel, or a larger {Arg('box')}"
             )
-        return found if self._conversion is None else self._conversion.to_palette(found)
+        return colours if self._conversion is None else self._conversion.to_palette(colours)
 
     def check_places(self, frame: float, pixels: Iterable[tuple[float, float]]) -> None:
         """Refuse a frame or pixels that the clip does not have; without a clip, nothing."""
@@ -203,10 +203,9 @@ class ClipOfPicks:
         frame = nearest_frame(clip, pick.frame)
         pixels = self.read(frame)
         real = np.asarray(np.isfinite(pixels).all(axis=2))
-        points = _core.pick_points(np.where(real[..., None], pixels, 0).reshape(-1, 3), display)
-        away = np.abs(points - _core.pick_points([pick.rgb], display)) < SAME_COLOUR
-        alike = away.all(axis=1).reshape(real.shape) & real
-        alike = ndimage.binary_opening(alike)
+        colours = np.where(real[..., None], pixels, 0).reshape(-1, 3)
+        distances = _core.pick_distances(colours, pick.rgb, display).reshape(real.shape)
+        alike = ndimage.binary_opening((distances < SAME_COLOUR) & real)
         if not alike.any():
             return None
         largest, place, box = largest_part(alike)
@@ -224,25 +223,25 @@ class ClipOfPicks:
         if clip is None:
             return ()
         frame = nearest_frame(clip, pick.frame)
-        _, found = follow.read_colours(clip, [frame], self._conversion)
-        if not found:
+        _, colours = follow.read_colours(clip, [frame], self._conversion)
+        if not colours:
             return ()
-        told = []
-        rgb, counts = found[0]
+        lines = []
+        rgb, counts = colours[0]
         unlike = min((_unlike(rgb, counts, rgbw) for rgbw in stored), default=0.0)
         if unlike > OTHER_CLIP:
-            told.append(
+            lines.append(
                 f"the colours of frame {frame} of {clip.source} differ much from those that were "
                 f"analysed; if it is another clip, give the analysed one as {Arg('clip')}, or "
                 "analyse it"
             )
         away = np.linalg.norm(rgb - pick.rgb, axis=1)
         if away.min() > ALIKE:
-            told.append(
+            lines.append(
                 f"no pixel of frame {frame} is near the colour of {pick.id}: the nearest one, "
                 f"{hex_of(rgb[away.argmin()])}, is {away.min():.2f} away"
             )
-        return tuple(map(Message, told))
+        return tuple(map(Message, lines))
 
     @property
     def there(self) -> bool:
@@ -274,11 +273,11 @@ def _unlike(
 
     Compared are how many pixels of each are near the stored colours.
     """
-    both = []
+    near = []
     for colours, shares in ((rgb, counts), (rgbw[:, :3], rgbw[:, 3])):
         square = ((colours[:, None] - rgbw[:, :3]) ** 2).sum(axis=2)
-        both.append(shares / shares.sum() @ np.exp(square / (-2 * ALIKE**2)))
-    return float(np.abs(both[0] - both[1]) @ rgbw[:, 3] / ((both[0] + both[1]) @ rgbw[:, 3]))
+        near.append(shares / shares.sum() @ np.exp(square / (-2 * ALIKE**2)))
+    return float(np.abs(near[0] - near[1]) @ rgbw[:, 3] / ((near[0] + near[1]) @ rgbw[:, 3]))
 
 
 def corrected(pick: Pick, frame: float, rgb: Colour) -> Pick:

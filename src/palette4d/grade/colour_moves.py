@@ -64,8 +64,8 @@ def shift_to(before: Colour, after: Colour) -> Move:
         if colour == before:
             return after
         share = min(1.0, max(0.0, _luma(colour)) / luma) if luma > 0 else 1.0
-        found = [c + share * (b - a) for a, b, c in zip(before, after, colour, strict=True)]
-        return as_colour(found)
+        result = [c + share * (b - a) for a, b, c in zip(before, after, colour, strict=True)]
+        return as_colour(result)
 
     return move
 

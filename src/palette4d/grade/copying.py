@@ -19,7 +19,7 @@ from palette4d.common.errors import Palette4dError
 from palette4d.common.files import same_file
 from palette4d.grade import recolouring
 from palette4d.grade.clip_of_picks import ClipOfPicks
-from palette4d.grade.edits import Colour, Key, Setting, as_colour, new_id
+from palette4d.grade.edits import VISIBLE, Colour, Key, Setting, as_colour, new_id
 from palette4d.grade.grade import Grade
 from palette4d.grade.keyframes import needed
 from palette4d.grade.pick_edits import taken
@@ -29,8 +29,6 @@ from palette4d.grade.versions import with_active_kept
 F64 = NDArray[np.float64]
 Time = Literal["relative"] | float
 
-#: Smaller deviations from straight lines need no stop: three steps of 8 bits.
-TOLERANCE = 3 / 255
 #: Smaller changes of a handle are rounding errors of 32-bit floats.
 LEAST = 1e-6
 #: Colours farther than this from the source's palette are not in its clip.
@@ -233,12 +231,12 @@ def _handles(target: Grade, graded: Callable[[F64, float], F64]) -> Iterator[tup
 
     first, last, step = target.frames
     before_at: dict[str, list[tuple[float, F64, F64]]] = {}
-    for at in frames_between(first, last, step):
-        palette = target.palette(at)
-        after = graded(palette.rgb, at)
+    for frame_at in frames_between(first, last, step):
+        palette = target.palette(frame_at)
+        after = graded(palette.rgb, frame_at)
         for id_, colour, new in zip(palette.ids, palette.rgb, after, strict=True):
             if id_ not in vertices:
-                before_at.setdefault(id_, []).append((float(at), colour, new))
+                before_at.setdefault(id_, []).append((float(frame_at), colour, new))
     for edge in polytope["edges"]:
         samples = before_at.get(edge["id"], [])
         ends = [vertices[edge[end]] for end in ("from", "to")]
@@ -248,7 +246,7 @@ def _handles(target: Grade, graded: Callable[[F64, float], F64]) -> Iterator[tup
             *(new - old for _, old, new in samples),
             shifts[edge["to"]],
         ]
-        for index in needed(times, np.array(changes), (), TOLERANCE, MOST_STOPS)[1:-1]:
+        for index in needed(times, np.array(changes), (), VISIBLE, MOST_STOPS)[1:-1]:
             frame, _, new = samples[index - 1]
             id_ = new_id("s", taken)
             taken.add(id_)
@@ -268,14 +266,14 @@ def _pick(match: Match, pick: Pick, into: Callable[[F64], F64] | None) -> Pick |
         return min(max(nearest, first), last)
 
     # What is of the other clip is left out.
-    found = replace(pick, pixel=None, box=None, areas=(), path=(), matte=None)
-    found = replace(found, start=None, until=None, fade=0.0)
+    copy = replace(pick, pixel=None, box=None, areas=(), path=(), matte=None)
+    copy = replace(copy, start=None, until=None, fade=0.0)
     if pick.to is not None:
-        found = replace(found, to=colour(pick.to))
+        copy = replace(copy, to=colour(pick.to))
     if match.time == "relative":
         keys = {time(key.frame): key for key in pick.path}
         return replace(
-            found,
+            copy,
             frame=time(pick.frame),
             rgb=colour(pick.rgb),
             start=None if pick.start is None else time(pick.start),
@@ -283,14 +281,14 @@ def _pick(match: Match, pick: Pick, into: Callable[[F64], F64] | None) -> Pick |
             fade=pick.fade * match.pace,
             path=tuple(replace(keys[f], frame=f, rgb=colour(keys[f].rgb)) for f in sorted(keys)),
         )
-    at = float(match.time)
-    start, until = (at if end is None else end for end in (pick.start, pick.until))
-    if not start <= at <= until:
+    moment = float(match.time)
+    start, until = (moment if end is None else end for end in (pick.start, pick.until))
+    if not start <= moment <= until:
         return None
-    rgb = pick.colour_at(at)
+    rgb = pick.colour_at(moment)
     if pick.to is not None and pick.toward == "shift":
-        found = replace(found, to=colour(rgb + pick.change_at(at)))
-    return replace(found, frame=match.target.frames[0], rgb=colour(rgb))
+        copy = replace(copy, to=colour(rgb + pick.change_at(moment)))
+    return replace(copy, frame=match.target.frames[0], rgb=colour(rgb))
 
 
 def _colours(target: Grade) -> Iterator[tuple[float, F64, F64]]:

@@ -387,7 +387,7 @@ class Document:
 
         None where the clip is not there. Without `tries` nothing is proposed; it is quicker.
         """
-        return answer.of(self.grade, self.grade.pick(id), self._clip(clip), tries=tries)
+        return answer.answer_to(self.grade, self.grade.pick(id), self._clip(clip), tries=tries)
 
     def pick_warnings(self, id: str, clip: OfClip | None = None) -> tuple[str, ...]:
         """Return what speaks against the clip of a pick or hold, and its colour."""
@@ -596,17 +596,17 @@ class Document:
 
     def _save_again(self, target: Path, file: File) -> None:
         with locked(target) as held:
-            found = sidecar.read_bytes(target)
-            if found == file.data and not self.changed:
+            on_disk = sidecar.read_bytes(target)
+            if on_disk == file.data and not self.changed:
                 return
             grade, history = self.grade, self.history
-            if found != file.data:
-                theirs = _read(*sidecar.decoded(found, grade.name), self.path)
+            if on_disk != file.data:
+                theirs = _read(*sidecar.decoded(on_disk, grade.name), self.path)
                 grade, history = merged(file, (grade, history), theirs)
             history = replace(history, done=tuple(bounded(history.done)))
             members = grade.fields(history.done, history.undone)
             core, data = _core.encode_sidecar(members, str(target))
-            sidecar.write(target, data, held, replaces=found)
+            sidecar.write(target, data, held, replaces=on_disk)
         self._saved(replace(grade, analysed=core), history, data)
 
 

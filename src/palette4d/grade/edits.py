@@ -37,6 +37,10 @@ RAMP: Key = ("ramp", "")
 #: The largest absolute code value that the file format allows (docs/sidecar.md).
 LARGEST_COLOUR = 1e6
 
+#: Differences up to this, three steps of 8 bits, are not seen in a graded picture: keys of a path
+#: and stops of a copy that change less are left out, and picks that miss by more are reported.
+VISIBLE = 3 / 255
+
 _HEX = re.compile(r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})")
 
 

@@ -1,9 +1,10 @@
 """Following: where a picked colour is at the other frames of its clip.
 
 Input: a clip, a colour at a frame, and the frames of interest. Output: a path of a few keys. From
-each frame to the next the colour moves as the mean of the pixels near it moves (mean shift). The
-path ends where the colour is lost among others: where many more pixels are near it. One pass reads
-the frames; memory holds at most `MOST_COLOURS` colours for at most `MOST_FRAMES` frames.
+each frame to the next the colour moves with the mean of its near pixels (mean shift, with a
+Gaussian of `ALIKE`). The path ends where the number of near pixels shows that they are another
+thing's. One pass reads the frames; memory holds at most `MOST_COLOURS` colours for at most
+`MOST_FRAMES` frames.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
-from palette4d.grade.edits import Colour, as_colour
+from palette4d.grade.edits import VISIBLE, Colour, as_colour
 from palette4d.grade.keyframes import needed
 from palette4d.grade.picks import ALIKE, PathKey
 from palette4d.media.clip_base import Clip, FrameError
@@ -25,39 +26,35 @@ F64 = NDArray[np.float64]
 Progress = Callable[[int, int], object]
 """Called as progress(done, total)."""
 
-#: Rounds of the mean shift from one frame to the next, and the step at which it has arrived.
-ROUNDS, ARRIVED = 8, 1e-4
-#: A colour moves at most so far from one frame to the next; what jumps is another object.
-MOST_STEP = 0.08
-#: Weight of the path's bends: what is shorter than some 2 pi STIFF^(1/4) frames is jitter, which
-#: would be flicker of the grade. And the weight of colours that the user gave.
-STIFF, PINNED = 12.0, 1e6
-#: How strongly the path is drawn to the picked colour, per frame. The pull fades as the count of
-#: pixels near that colour departs from the first count; at half or twice that count it is 0.
-HOME, SAME = 0.5, 2
-#: Where more than LOST times as many pixels as at first are near, the colour is another thing's, as
-#: in the night, where all is dark. From there on it has ended, unless it comes back to its start.
-LOST = 7.0
-#: A colour this far from its start is another one: there it must have as many pixels, by SAME.
-FAR = 0.5
-#: Where fewer than one in GONE of the pixels at first is near, its object is not in the picture:
-#: what is left is others, and the change would be theirs.
-GONE = 20.0
-#: Fewer near pixels than this share of a frame: the colour is out of sight and stays.
+#: Digits of a path's code values and shares. A step of the mean shift below the last one ends it.
+DIGITS = 4
+#: Rounds of the mean shift from one frame to the next. With 100, 15 of 140 paths slide to another
+#: colour (docs/lab/picks.md).
+ROUNDS = 8
+#: Weight of the path's bends, in frames^4: jitter shorter than 2 pi STIFF^(1/4) = 12 frames is
+#: smoothed, since it would be flicker of the grade. Larger: late where a light changes.
+STIFF = 12.0
+#: Weight of the colours that the user gave, against 1 for the others: they are met.
+PINNED = 1e6
+#: A path returns to its first colour by this share of the way in each frame, while as many pixels
+#: as at first are near that. Without it, 34 of 140 paths drift by more than 0.05.
+HOME = 0.5
+#: Ratios of the number of near pixels to that at the start. Beyond OTHER they are another thing's,
+#: at once; where the colour has moved by FAR or more (code values), beyond SAME. SAME is also the
+#: ratio at which HOME has faded to 0. From 7 to 20, OTHER changes five of 140 paths.
+OTHER, SAME, FAR = 12.0, 2.0, 0.5
+#: Share of a frame's pixels below which a colour is out of sight, and stays where it was: the mean
+#: of so few pixels is that of other things'.
 LEAST_SHARE = 1e-5
 
 #: In a longer range every n-th frame is read.
 MOST_FRAMES = 600
 #: Colours kept for each frame.
 MOST_COLOURS = 2048
-
-#: Keys that a straight line between their neighbours meets within this are left out.
-STRAIGHT = 0.012
-#: At most so many keys; a path with more is told less exactly.
+#: Most keys of a path beside the given ones; longer paths are simplified further.
 MOST_KEYS = 48
-DIGITS = 4
-#: A smoothed path has ended, or is all there, within this share.
-BARELY = 0.05
+#: Smoothing overshoots a fade's ends by less than this share; within it a path is there, or is not.
+OVERSHOOT = 0.05
 
 
 def paths(
@@ -115,16 +112,12 @@ def paths(
     joined = _joined(frames, colours, known)
     if len(known) == 1:
         joined[:, :3] = _without_drift(joined[:, :3], np.array(starts[0][1]))
-    found = _smoothed(joined, [frames.index(frame) for frame in known])
-    found[:, 3] = np.clip((found[:, 3] - BARELY) / (1 - 2 * BARELY), 0.0, 1.0)
-    kept = needed(frames, found, map(frames.index, known), STRAIGHT, MOST_KEYS)
+    path = _smoothed(joined, [frames.index(frame) for frame in known])
+    path[:, 3] = np.clip((path[:, 3] - OVERSHOOT) / (1 - 2 * OVERSHOOT), 0.0, 1.0)
+    kept = needed(frames, path, map(frames.index, known), VISIBLE, MOST_KEYS)
+    path = np.round(path, DIGITS)
     return tuple(
-        PathKey(
-            frames[i],
-            as_colour(np.round(found[i, :3], DIGITS)),
-            frames[i] in known,
-            float(np.round(found[i, 3], DIGITS)),
-        )
+        PathKey(frames[i], as_colour(path[i, :3]), frames[i] in known, float(path[i, 3]))
         for i in kept
     )
 
@@ -159,47 +152,47 @@ def _joined(
     frames: Sequence[int], colours: Sequence[tuple[F64, F64]], known: dict[int, Colour]
 ) -> F64:
     """Return the (n, 4) path through all known colours, and whether the colour is there."""
-    at = {frames.index(frame): np.array(rgb) for frame, rgb in known.items()}
-    order = sorted(at)
-    found = np.empty((len(frames), 4))
-    found[: order[0] + 1] = _followed(colours[: order[0] + 1][::-1], at[order[0]])[::-1]
-    found[order[-1] :] = _followed(colours[order[-1] :], at[order[-1]])
-    for a, b in itertools.pairwise(order):
-        forward = _followed(colours[a : b + 1], at[a])
-        backward = _followed(colours[a : b + 1][::-1], at[b])[::-1]
+    starts = {frames.index(frame): np.array(rgb) for frame, rgb in known.items()}
+    first, *_, last = [*sorted(starts)] * 2
+    path = np.empty((len(frames), 4))
+    path[: first + 1] = _followed(colours[: first + 1][::-1], starts[first])[::-1]
+    path[last:] = _followed(colours[last:], starts[last])
+    for a, b in itertools.pairwise(sorted(starts)):
+        forward = _followed(colours[a : b + 1], starts[a])
+        backward = _followed(colours[a : b + 1][::-1], starts[b])[::-1]
         part = np.linspace(0, 1, b - a + 1)[:, None]
-        found[a : b + 1] = (1 - part) * forward + part * backward
-    return found
+        path[a : b + 1] = (1 - part) * forward + part * backward
+    return path
 
 
 def _followed(colours: Sequence[tuple[F64, F64]], start: F64) -> F64:
-    """Return the (n, 4) path from a colour in the first frame to the last one.
+    """Return the (n, 4) path from a colour in the first frame to the last frame.
 
-    The fourth column is 1 while the colour is there, and 0 from where it is lost, and where hardly
-    any pixel has it.
+    The fourth column is 1 while the colour is there, and 0 where its near pixels are another
+    thing's. From there on the path has ended, unless it returns to its start.
     """
-    home, pixels = _near(start, *colours[0]), _alike(start, *colours[0])
+    home = _near(start, *colours[0])
     path, seen, alive = [start], [1.0], True
     for before, after in itertools.pairwise(colours):
-        there = _shifted(path[-1], before, after)
-        now = _near(start, *after)
-        if home is not None and now is not None:
+        colour = _shifted(path[-1], before, after)
+        still = _near(start, *after)
+        if home is not None and still is not None:
             # While as many pixels as at first are near the start, the colour is still there:
             # without this, small errors would add up in a still picture.
-            same = min(now[1] / home[1], home[1] / now[1])
-            still = start + now[0] - home[0]
-            there = there + HOME * max(0.0, 1 - (1 - same) * SAME) * (still - there)
-        path.append(there)
-        found = _near(there, *after)
-        # The farther it has gone, the more it must be as large as at first: else it has slid over
+            ratio = min(still[1] / home[1], home[1] / still[1])
+            returned = start + still[0] - home[0]
+            colour = colour + HOME * max(0.0, 1 - (1 - ratio) * SAME) * (returned - colour)
+        path.append(colour)
+        near = _near(colour, *after)
+        moved = float(np.linalg.norm(colour - start))
+        # The farther it has moved, the more it must be as large as at first: else it has slid over
         # to another thing.
-        far = min(1.0, float(np.linalg.norm(there - start)) / FAR)
-        most, least = LOST ** (1 - far) * SAME**far, far / SAME
-        size = 1.0 if home is None or found is None else found[1] / home[1]
-        lost = size > most or size < least
-        back = float(np.linalg.norm(there - start)) < ALIKE
-        alive = not lost and (back or alive)
-        seen.append(float(alive and GONE * _alike(there, *after) >= pixels))
+        far = min(1.0, moved / FAR)
+        allowed = OTHER ** (1 - far) * SAME**far
+        ratio = 1.0 if home is None or near is None else near[1] / home[1]
+        other = not 1 / allowed <= ratio <= allowed
+        alive = not other and (moved < ALIKE or alive)
+        seen.append(float(alive))
     return np.column_stack([path, seen])
 
 
@@ -216,11 +209,6 @@ def _without_drift(path: F64, start: F64) -> F64:
     return kept
 
 
-def _alike(colour: F64, rgb: F64, counts: F64) -> float:
-    """Return the share of a frame's pixels that have a colour or one like it."""
-    return float(counts[((rgb - colour) ** 2).sum(axis=1) < ALIKE**2].sum() / counts.sum())
-
-
 def _smoothed(path: F64, fixed: Sequence[int]) -> F64:
     """Return the path without its jitter (Whittaker's smoothing); fixed places stay."""
     weight = np.ones(len(path))
@@ -232,21 +220,24 @@ def _smoothed(path: F64, fixed: Sequence[int]) -> F64:
 
 
 def _shifted(here: F64, before: tuple[F64, F64], after: tuple[F64, F64]) -> F64:
-    """Return where a colour of one frame is in the next one (mean shift)."""
-    found = _near(here, *before)
-    if found is None:
+    """Return where a colour of one frame is in the next one (mean shift).
+
+    It moves by `ALIKE` at most: what jumps farther is another thing.
+    """
+    near = _near(here, *before)
+    if near is None:
         return here
-    offset, there = found[0] - here, here
+    offset, there = near[0] - here, here
     for _ in range(ROUNDS):
-        found = _near(there, *after)
-        if found is None:
+        near = _near(there, *after)
+        if near is None:
             return here
-        step = found[0] - offset - there
+        step = near[0] - offset - there
         there = there + step
-        if np.abs(step).max() < ARRIVED:
+        if np.abs(step).max() < 10.0**-DIGITS:
             break
     length = float(np.linalg.norm(there - here))
-    moved: F64 = here + (there - here) * min(1.0, MOST_STEP / max(length, MOST_STEP))
+    moved: F64 = here + (there - here) * min(1.0, ALIKE / max(length, ALIKE))
     return moved
 
 

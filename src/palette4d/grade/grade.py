@@ -152,8 +152,8 @@ class Grade:
     @property
     def frames(self) -> tuple[int, int, int]:
         """First and last frame number of the clip, and the step between frames."""
-        found = self.members["clip"]["frames"]
-        return found["first"], found["last"], found["step"]
+        frames = self.members["clip"]["frames"]
+        return frames["first"], frames["last"], frames["step"]
 
     @property
     def encoding(self) -> str:
@@ -181,8 +181,8 @@ class Grade:
     @property
     def ramp(self) -> Ramp:
         """The clip's ramp between handles: "linear", "smooth" or "hold"."""
-        found: Ramp = self.state.get(RAMP, "linear")
-        return found
+        ramp: Ramp = self.state.get(RAMP, "linear")
+        return ramp
 
     @cached_property
     def picks(self) -> tuple[Pick, ...]:
@@ -199,10 +199,10 @@ class Grade:
 
     def pick(self, id: str) -> Pick:
         """Return a pick or hold by its id."""
-        found: Pick | None = self.state.get(("pick", id))
-        if found is None:
+        pick: Pick | None = self.state.get(("pick", id))
+        if pick is None:
             raise unknown(id, "pick or hold", [pick.id for pick in self.picks], "`picks`")
-        return found
+        return pick
 
     @property
     def versions(self) -> tuple[str, ...]:
@@ -217,11 +217,11 @@ class Grade:
 
     def of_version(self, name: str) -> State:
         """Return the state of a version."""
-        found: State | None = self.state.get(("version", name))
-        if found is None:
+        state: State | None = self.state.get(("version", name))
+        if state is None:
             there = ", ".join(map(repr, self.versions)) or "none"
             raise Palette4dError(f"there is no version {name!r}; the palette has {there}")
-        return found
+        return state
 
     @property
     def same_edits(self) -> tuple[str, ...]:
@@ -328,8 +328,8 @@ class Grade:
         setting = self.settings.get(id or "")
         if setting is not None and setting.frame is not None:
             return setting.frame
-        found: float = self.handles.vertex(id or "", self.settings)["frame"]
-        return found
+        own: float = self.handles.vertex(id or "", self.settings)["frame"]
+        return own
 
     def setting(self, id: str) -> Setting:
         """Return the setting of a handle; of one that is not edited, its own colour."""

@@ -86,45 +86,45 @@ def set_near(
 ) -> tuple[Grade, Near]:
     """Change the palette colour nearest to a given colour at a frame (`Document.set_near`)."""
     wanted = grade.checked(near, how.get("any_value", False))
-    found = grade.near(wanted, frame=frame)
-    if found.distance > FAR and not anyway:
-        raise Palette4dError(found.refusal(wanted))
+    nearest = grade.near(wanted, frame=frame)
+    if nearest.distance > FAR and not anyway:
+        raise Palette4dError(nearest.refusal(wanted))
     start, until, fade = how.get("start"), how.get("until"), how.get("fade")
     if colour_moves.range_of(start, until, fade, grade.frames) is not None:
-        at = frame if found.id in grade.handles.edges else None
-        after, _ = adjust(grade, found.id, frame=at, **how)
-        return after, replace(found, handle=None)
-    move, _ = _move(grade, found.id, frame, how)
-    new = as_colour(move(found.rgb))
-    handle, moved = found.handle, new
-    if handle in grade.handles.vertices and handle != found.id:
-        share = _share(grade, handle, found.id, frame)
+        time = frame if nearest.id in grade.handles.edges else None
+        after, _ = adjust(grade, nearest.id, frame=time, **how)
+        return after, replace(nearest, handle=None)
+    move, _ = _move(grade, nearest.id, frame, how)
+    new = as_colour(move(nearest.rgb))
+    handle, moved = nearest.handle, new
+    if handle in grade.handles.vertices and handle != nearest.id:
+        share = _share(grade, handle, nearest.id, frame)
         if share < LEAST_SHARE:
             handle = None
         else:
             own = grade.colour(handle)
             moved = as_colour(
-                [o + (n - f) / share for o, n, f in zip(own, new, found.rgb, strict=True)]
+                [o + (n - f) / share for o, n, f in zip(own, new, nearest.rgb, strict=True)]
             )
-    label = f"set {handle or found.id} at frame {frame:g} to {text_of(new)}"
+    label = f"set {handle or nearest.id} at frame {frame:g} to {text_of(new)}"
     if handle is not None:
         grade = set_colour(grade, handle, moved)
     else:
-        grade, handle = stop(grade, found.id, frame, new)
+        grade, handle = stop(grade, nearest.id, frame, new)
     if (ramp := how.get("ramp")) is not None:
         grade = set_ramp(grade, ramp, handle)
-    return grade.labelled(label), replace(found, handle=handle)
+    return grade.labelled(label), replace(nearest, handle=handle)
 
 
 def _share(grade: Grade, vertex: str, edge: str, frame: float) -> float:
     """Return the weight, 0..1, of an end of an edge in the edge's displacement at a frame."""
-    at: float = grade.handles.vertex(vertex)["frame"]
+    own: float = grade.handles.vertex(vertex)["frame"]
     ends = grade.handles.edges[edge]
     knots: list[float] = [grade.handles.vertex(ends[end])["frame"] for end in ("from", "to")]
-    stops = [each for each in grade.settings.values() if each.edge == edge]
-    knots += [each.frame for each in stops if each.frame is not None]
-    nearest: float = min(abs(knot - at) for knot in knots if knot != at)
-    return max(0.0, 1 - abs(frame - at) / nearest)
+    stops = [stop for stop in grade.settings.values() if stop.edge == edge]
+    knots += [stop.frame for stop in stops if stop.frame is not None]
+    nearest: float = min(abs(knot - own) for knot in knots if knot != own)
+    return max(0.0, 1 - abs(frame - own) / nearest)
 
 
 def shift(grade: Grade, id: str, offset: Colour) -> Grade:
@@ -235,8 +235,8 @@ def _move(
             f"the whole palette cannot get one colour; expected offsets as {Arg('by')}, or "
             "hue, chroma and lightness"
         )
-    new, at = grade.checked(rgb, any_value), grade.frame_of(id, frame)
-    before = grade.colour_on_edge(id, at) if id in grade.handles.edges else grade.colour(id)
+    new, time = grade.checked(rgb, any_value), grade.frame_of(id, frame)
+    before = grade.colour_on_edge(id, time) if id in grade.handles.edges else grade.colour(id)
     return colour_moves.shift_to(before, new), f"to {text_of(new)}"
 
 

@@ -29,8 +29,8 @@ def vertex_colours(
     encoding : str
         The palette's encoding; unknown counts as sRGB.
     """
-    found = named_lch([vertex["rgb"] for vertex in vertices], encoding)
-    names = [name for _, name in found]
+    named = named_lch([vertex["rgb"] for vertex in vertices], encoding)
+    names = [name for _, name in named]
     frames = [float(vertex["frame"]) for vertex in vertices]
     times: dict[str, list[tuple[float, float]]] = {}
     tracks: dict[str, dict[int, list[int]]] = {}
@@ -39,10 +39,10 @@ def vertex_colours(
             name = names[run.vertices[0]]
             times.setdefault(name, []).append((run.first, run.last))
             tracks.setdefault(name, {}).setdefault(number, []).extend(run.vertices)
-    for name, of in tracks.items():
+    for name, chains in tracks.items():
         in_time = itertools.pairwise(sorted(times[name]))
         if any(later[0] <= earlier[1] for earlier, later in in_time):
-            light_first = sorted(of.values(), key=lambda same: -max(found[v][0] for v in same))
+            light_first = sorted(chains.values(), key=lambda same: -max(named[v][0] for v in same))
             for number, same in enumerate(light_first, 1):
                 for vertex in same:
                     names[vertex] = f"{name} {number}"

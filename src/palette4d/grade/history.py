@@ -61,7 +61,7 @@ def merged(
     Palette4dError
         The palettes differ, or both changed one value in different ways.
     """
-    (own, history), (other, found) = mine, theirs
+    (own, history), (other, steps) = mine, theirs
     if other.members["polytope"] != own.members["polytope"]:
         raise Palette4dError(
             f"{own.name}: the clip was analysed again since this palette was loaded, and the "
@@ -78,5 +78,5 @@ def merged(
     label = new[0].label if len(new) == 1 else "edits of two programs"
     if (step := edits.difference(other.state, state, label).undoable()).changes:
         # Steps that were undone do not fit what has another id now.
-        found = History((*found.done, step), () if names else history.undone)
-    return other.with_mattes(own.mattes).with_state(state), found
+        steps = History((*steps.done, step), () if names else history.undone)
+    return other.with_mattes(own.mattes).with_state(state), steps

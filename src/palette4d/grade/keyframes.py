@@ -31,8 +31,8 @@ def needed(
     kept = sorted({0, len(times) - 1, *fixed})
     limit = len(times) if most is None else most + len(kept)
     while len(kept) < limit:
-        at = [times[i] for i in kept]
-        lines = [np.interp(times, at, column[kept]) for column in values.T]
+        chosen = [times[i] for i in kept]
+        lines = [np.interp(times, chosen, column[kept]) for column in values.T]
         off = np.abs(np.stack(lines, axis=1) - values).max(axis=1)
         if off.max() <= tolerance:
             break

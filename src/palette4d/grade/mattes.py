@@ -92,25 +92,25 @@ def learn(
         background = [brush for hold in holds for brush in _brushes(hold, frame, frames)]
         colour = tuple(pick.colour_at(frame).tolist())
         given.append((read(frame), colour, own, background, frame in seeded))
-    found = _core.learn_matte(
+    learned = _core.learn_matte(
         given,
         pick.rgb,
         holds=[tuple(hold.colour_at(pick.frame).tolist()) for hold in holds],
         display=display,
     )
-    odds: Bytes = found["odds"]
-    return Learned(id_of(odds), text_of(odds), found["found"], found["share"])
+    odds: Bytes = learned["odds"]
+    return Learned(id_of(odds), text_of(odds), learned["found"], learned["share"])
 
 
 def _brushes(pick: Pick, frame: int, frames: Sequence[int]) -> list[Brush]:
     """Return the places of a frame that a pick or hold names: points and a radius each."""
-    found: list[Brush] = []
+    brushes: list[Brush] = []
     if pick.pixel is not None and _nearest(frames, pick.frame) == frame:
-        found.append(([pick.pixel], (pick.box or 1) / 2))
+        brushes.append(([pick.pixel], (pick.box or 1) / 2))
     for area in pick.areas:
         if _nearest(frames, area.frame) == frame:
-            found.append((list(area.points), float(area.radius)))
-    return found
+            brushes.append((list(area.points), float(area.radius)))
+    return brushes
 
 
 def _nearest(frames: Sequence[int], frame: float) -> int:

@@ -114,7 +114,7 @@ def history_of(members: Mapping[str, Any], name: str) -> tuple[tuple[Edit, ...],
     SidecarError
         The member "history" is unusable; `name` is the file.
     """
-    found = []
+    parts = []
     for part in ("done", "undone"):
         try:
             steps = [_step(fields) for fields in members.get("history", {}).get(part, [])]
@@ -126,8 +126,8 @@ def history_of(members: Mapping[str, Any], name: str) -> tuple[tuple[Edit, ...],
                 "the steps that palette4d wrote; remove the member `history` to go on without them",
             ) from None
         # Older files have steps that make versions.
-        found.append(tuple(kept for step in steps if (kept := step.undoable()).changes))
-    return found[0], found[1]
+        parts.append(tuple(kept for step in steps if (kept := step.undoable()).changes))
+    return parts[0], parts[1]
 
 
 def bounded(steps: Sequence[Edit]) -> Sequence[Edit]:

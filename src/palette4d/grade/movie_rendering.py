@@ -81,31 +81,31 @@ class MoviePlan:
 
 def movie_notes(clip: Clip, delivery: Delivery, size: tuple[int, int]) -> list[str]:
     """Return notes on what a movie of this clip cannot keep: size, alpha, colours."""
-    found = list(delivery.notes)
+    notes = list(delivery.notes)
     across, rows = delivery.codec.across, delivery.rows
     if size[0] % across or size[1] % rows:
-        found.append(
+        notes.append(
             f"the picture is {size[0]}x{size[1]} pixels, {delivery.codec.name} needs multiples "
             f"of {across}x{rows}; the last column or row is repeated"
         )
     bits = int(clip.depth[4:]) if clip.is_movie and clip.depth.startswith("uint") else 0
     if bits > delivery.codec.bits == 8:
-        found.append(
+        notes.append(
             Message(
                 f"the clip has {bits} bits a sample, {delivery.codec.name} has 8: smooth ramps may "
                 f"show bands; {Arg('codec', 'hevc')} keeps 10 bits"
             )
         )
     if "linear" in clip.encoding:
-        found.append(
+        notes.append(
             f"the clip's code values are {clip.encoding} and stay so: the movie looks dark in most "
             "players. Render frames, and convert those to a display space"
         )
     elif clip.encoding != "unknown" and not clip.stated.tags.known and not clip.is_movie:
-        found.append(
+        notes.append(
             f"the movie cannot say that its colours are {clip.encoding}: no colour tag means that"
         )
-    return found
+    return notes
 
 
 def _stated(clip: Clip, rate: Fraction) -> Stated:

@@ -166,12 +166,12 @@ class Output:
     ) -> _core.Recolourer | None:
         """Return what draws a matte; None without one."""
         polytope, edits, frame = sidecar.polytope, sidecar.edits, palette.frame
-        found = None
+        matte = None
         if self.kind == "pick":
             if self.id not in picks:
                 known = f"expected {' or '.join(picks)}" if picks else "there are none"
                 raise Palette4dError(f"there is no pick or hold {self.id!r}; {known}")
-            found, edited = sidecar.pick_matte_at(self.id, frame), palette.rgb
+            matte, edited = sidecar.pick_matte_at(self.id, frame), palette.rgb
         elif self.kind == "outside":
             edited = _core.surface_reader(_core.slice_at(polytope, frame))
         elif self.kind == "weight":
@@ -187,4 +187,4 @@ class Output:
             edited = _core.weight_reader(polytope, edits, slice, self.id)
         else:
             return None
-        return _core.Recolourer(palette.rgb, edited, palette.faces, picks=found)
+        return _core.Recolourer(palette.rgb, edited, palette.faces, picks=matte)

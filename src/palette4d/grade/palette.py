@@ -50,8 +50,8 @@ class Palette:
     def shares(self, colour: Colour) -> list[tuple[str, float]]:
         """Return the mean value weights of the edited colours in a colour, largest first."""
         weights, _ = _core.palette_weights([colour], self.edited, self.faces)
-        found = zip(self.ids, weights[0].tolist(), strict=True)
-        return sorted(found, key=lambda share: -share[1])
+        named = zip(self.ids, weights[0].tolist(), strict=True)
+        return sorted(named, key=lambda share: -share[1])
 
 
 @dataclass(frozen=True)

@@ -16,13 +16,10 @@ from palette4d.grade import recolouring
 from palette4d.grade.clip_colours import ClipColours
 from palette4d.grade.clip_of_picks import ClipOfPicks, corrected
 from palette4d.grade.colour_moves import range_text
-from palette4d.grade.edits import Key, as_colour, new_id
+from palette4d.grade.edits import VISIBLE, Key, as_colour, new_id
 from palette4d.grade.follow import Progress
 from palette4d.grade.grade import Grade
 from palette4d.grade.picks import MOST_PICKS, Area, Pick, Toward, check
-
-#: A picked colour that is farther than this from what was asked, 3 of 255, is told.
-MET = 0.012
 
 
 class Where(TypedDict, total=False):
@@ -97,12 +94,12 @@ def pick(
     **asked: Unpack[Asked],
 ) -> tuple[Grade, Pick]:
     """Change a thing's colour into another one (`Document.pick`)."""
-    at = _picked(grade, of_clip, frame, asked)
+    picked = _picked(grade, of_clip, frame, asked)
     to, by = asked.get("to"), asked.get("by")
     if to is not None and by is None:
         new = grade.checked(to, asked.get("any_value", False))
     elif by is not None and to is None:
-        new = as_colour([a + b for a, b in zip(at.rgb, as_colour(by, "change"), strict=True)])
+        new = as_colour([a + b for a, b in zip(picked.rgb, as_colour(by, "change"), strict=True)])
     else:
         raise Palette4dError(
             f"found {'neither' if to is None else 'both'} of the new colour (to) and the "
@@ -111,8 +108,8 @@ def pick(
     given: dict[str, Any] = {**asked}
     names = ("toward", "whole_hue", "reach", "softness", "lightness")
     shape = {name: given[name] for name in names if name in given}
-    found = replace(at, kind="pick", to=new, **shape)
-    return _add(grade, of_clip, found, asked, progress)
+    made = replace(picked, kind="pick", to=new, **shape)
+    return _add(grade, of_clip, made, asked, progress)
 
 
 def hold(
@@ -135,10 +132,12 @@ def correct_path(
     **where: Unpack[Where],
 ) -> Grade:
     """Say where the colour of a pick or hold is at another frame (`Document.correct_path`)."""
-    at = _picked(grade, of_clip, frame, where)
-    found = corrected(grade.pick(id), at.frame, at.rgb)
-    found = replace(found, path=of_clip.path(found, found.path, progress))
-    return _learned(grade, of_clip, found, f"correct {id}: {hex_of(at.rgb)} at frame {frame:g}")
+    picked = _picked(grade, of_clip, frame, where)
+    changed = corrected(grade.pick(id), picked.frame, picked.rgb)
+    changed = replace(changed, path=of_clip.path(changed, changed.path, progress))
+    return _learned(
+        grade, of_clip, changed, f"correct {id}: {hex_of(picked.rgb)} at frame {frame:g}"
+    )
 
 
 def add_area(grade: Grade, of_clip: ClipOfPicks, id: str, area: Area) -> Grade:
@@ -151,9 +150,9 @@ def add_area(grade: Grade, of_clip: ClipOfPicks, id: str, area: Area) -> Grade:
             f"learned from its pixels; give {Arg('clip')}"
         )
     of_clip.check_places(area.frame, area.points)
-    found = replace(old, areas=(*old.areas, area), whole_hue=False)
+    changed = replace(old, areas=(*old.areas, area), whole_hue=False)
     what = "a box" if len(area.points) == 1 else "a stroke"
-    return _learned(grade, of_clip, found, f"add {what} at frame {area.frame:g} to {id}")
+    return _learned(grade, of_clip, changed, f"add {what} at frame {area.frame:g} to {id}")
 
 
 def change_pick(
@@ -216,28 +215,28 @@ def taken(grade: Grade, of_clip: ClipOfPicks, picks: Iterable[Pick]) -> tuple[Gr
     """
     left_out = []
     # Holds first: they are background for the picks.
-    for each in sorted(picks, key=lambda pick: pick.kind == "pick"):
+    for pick in sorted(picks, key=lambda pick: pick.kind == "pick"):
         there = of_clip.open() is not None
-        found = of_clip.at_home(each, grade.display()) if there and not each.whole_hue else each
-        if found is None:
-            left_out.append(f"{each.id} ({_asked(each)})")
+        here = of_clip.at_home(pick, grade.display()) if there and not pick.whole_hue else pick
+        if here is None:
+            left_out.append(f"{pick.id} ({_asked(pick)})")
             continue
         if there:
-            found = replace(found, path=of_clip.path(found))
-        grade = _with_matte(grade, of_clip, found)
+            here = replace(here, path=of_clip.path(here))
+        grade = _with_matte(grade, of_clip, here)
     return grade, left_out
 
 
 def warnings(grade: Grade, of_clip: ClipOfPicks, id: str) -> tuple[str, ...]:
     """Return what speaks against the clip of a pick or hold, and its colour."""
-    found = grade.pick(id)
+    pick = grade.pick(id)
     known = ClipColours(grade.core.polytope, grade.members)
-    stored = [known.colours_at(found.frame), *known.colours] if known.colours else []
-    told = of_clip.warnings(found, stored) + _unmet(grade, found)
-    outside = found.to is not None and not all(-0.05 <= value <= 1.05 for value in found.to)
+    stored = [known.colours_at(pick.frame), *known.colours] if known.colours else []
+    lines = of_clip.warnings(pick, stored) + _unmet(grade, pick)
+    outside = pick.to is not None and not all(-0.05 <= value <= 1.05 for value in pick.to)
     if outside and not grade.scene_linear:
-        told += (f"the new colour of {id} lies far outside 0..1; most files clip it",)
-    return told
+        lines += (f"the new colour of {id} lies far outside 0..1; most files clip it",)
+    return lines
 
 
 def _unmet(grade: Grade, pick: Pick) -> tuple[str, ...]:
@@ -246,15 +245,15 @@ def _unmet(grade: Grade, pick: Pick) -> tuple[str, ...]:
     if not pick.enabled or pick.strength_at(pick.frame, step) < 1:
         return ()
     image = np.array(pick.rgb, np.float32)[None, None]
-    found = recolouring.recolour(grade, image, pick.frame, space="palette", clean_up=0)[0, 0]
-    off = float(np.linalg.norm(found - pick.rgb - pick.change_at(pick.frame)))
+    result = recolouring.recolour(grade, image, pick.frame, space="palette", clean_up=0)[0, 0]
+    missed = float(np.linalg.norm(result - pick.rgb - pick.change_at(pick.frame)))
     others = [p for p in grade.picks if p.enabled and p.id != pick.id]
-    if off <= MET or not others:
+    if missed <= VISIBLE or not others:
         return ()
     away = [float(np.linalg.norm(p.colour_at(pick.frame) - pick.rgb)) for p in others]
     near = others[int(np.argmin(away))]
     return (
-        f"{pick.id} is off by {off:.3f}: {near.id} has nearly the same colour, {min(away):.3f} "
+        f"{pick.id} is off by {missed:.3f}: {near.id} has nearly the same colour, {min(away):.3f} "
         f"away, and asks for something else. Change or disable one of {pick.id} and {near.id}",
     )
 
@@ -276,33 +275,33 @@ def _picked(grade: Grade, of_clip: ClipOfPicks, frame: float, where: Where) -> P
 
 
 def _add(
-    grade: Grade, of_clip: ClipOfPicks, found: Pick, asked: When, progress: Progress | None
+    grade: Grade, of_clip: ClipOfPicks, made: Pick, asked: When, progress: Progress | None
 ) -> tuple[Grade, Pick]:
-    enabled = sum(each.enabled for each in grade.picks)
+    enabled = sum(other.enabled for other in grade.picks)
     if enabled >= MOST_PICKS:
         raise Palette4dError(
             f"there are {enabled} picks and holds, and at most {MOST_PICKS} can be "
             "enabled; remove or disable some (`unpick`, `disable`)"
         )
-    found = replace(
-        found,
+    made = replace(
+        made,
         areas=tuple(asked.get("areas", ())),
         start=asked.get("start"),
         until=asked.get("until"),
         fade=asked.get("fade", 0.0),
     )
-    _check(grade, found)
-    for area in found.areas:
+    _check(grade, made)
+    for area in made.areas:
         of_clip.check_places(area.frame, area.points)
     if asked.get("follow", True):
-        found = replace(found, path=of_clip.path(found, progress=progress))
-    for each in grade.picks:
-        if _same(replace(each, path=()) if of_clip.unread else each, found):
-            off = "" if each.enabled else f", disabled: `enable {each.id}`"
-            raise Palette4dError(f"{each.id} is this {found.kind} already{off}; nothing was added")
-    found = replace(found, id=new_id("p", [each.id for each in grade.picks]))
-    grade = _learned(grade, of_clip, found, f"{found.kind} {found.id}: {_asked(found)}")
-    return grade, grade.pick(found.id)
+        made = replace(made, path=of_clip.path(made, progress=progress))
+    for other in grade.picks:
+        if _same(replace(other, path=()) if of_clip.unread else other, made):
+            off = "" if other.enabled else f", disabled: `enable {other.id}`"
+            raise Palette4dError(f"{other.id} is this {made.kind} already{off}; nothing was added")
+    made = replace(made, id=new_id("p", [other.id for other in grade.picks]))
+    grade = _learned(grade, of_clip, made, f"{made.kind} {made.id}: {_asked(made)}")
+    return grade, grade.pick(made.id)
 
 
 def _learned(grade: Grade, of_clip: ClipOfPicks, pick: Pick, label: str) -> Grade:
@@ -335,9 +334,9 @@ def _with_matte(grade: Grade, of_clip: ClipOfPicks, pick: Pick) -> Grade:
     return known.put("pick", pick.id, replace(pick, matte=matte))
 
 
-def _check(grade: Grade, found: Pick) -> None:
-    grade.check_frame(found.frame)
-    check(found, grade.frames)
+def _check(grade: Grade, pick: Pick) -> None:
+    grade.check_frame(pick.frame)
+    check(pick, grade.frames)
 
 
 def _same(old: Pick, new: Pick) -> bool:
@@ -349,7 +348,7 @@ def _same(old: Pick, new: Pick) -> bool:
 
 def _changed(old: Pick, new: Pick) -> str:
     """Return what is new of a pick, for people: "to #803020, fades of 4 frames"."""
-    both = [
+    texts = [
         (
             f"{hex_of(pick.rgb)} at frame {pick.frame:g}",
             "" if pick.to is None else f"to {hex_of(pick.to)}",
@@ -366,8 +365,8 @@ def _changed(old: Pick, new: Pick) -> str:
         )
         for pick in (old, new)
     ]
-    found = [after for before, after in zip(*both, strict=True) if before != after]
-    return ", ".join(found) or _asked(new)
+    changes = [after for before, after in zip(*texts, strict=True) if before != after]
+    return ", ".join(changes) or _asked(new)
 
 
 def _asked(pick: Pick) -> str:

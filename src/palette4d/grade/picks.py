@@ -143,16 +143,16 @@ class Pick:
         known = {
             field.name: _NAMES.get(field.name, field.name) for field in dataclasses.fields(cls)
         }
-        found = {own: fields[name] for own, name in known.items() if name in fields}
+        values = {own: fields[name] for own, name in known.items() if name in fields}
         for name in ("rgb", "to"):
-            if name in found:
-                found[name] = as_colour(found[name])
+            if name in values:
+                values[name] = as_colour(values[name])
         for name in ("pixel", "lightness"):
-            if name in found:
-                found[name] = (found[name][0], found[name][1])
-        path, areas = found.pop("path", ()), found.pop("areas", ())
+            if name in values:
+                values[name] = (values[name][0], values[name][1])
+        path, areas = values.pop("path", ()), values.pop("areas", ())
         return cls(
-            **found,
+            **values,
             path=tuple(PathKey(**{**key, "rgb": as_colour(key["rgb"])}) for key in path),
             areas=tuple(
                 Area(**{**area, "points": tuple((x, y) for x, y in area["points"])})
@@ -196,17 +196,17 @@ class Pick:
         frames, _, there = self._keys
         low = frames[0] if self.start is None else max(frames[0], self.start)
         high = frames[-1] if self.until is None else min(frames[-1], self.until)
-        at = np.unique(np.linspace(low, max(low, high), 1000).round())
-        at = at[(low <= at) & (at <= high) & (np.interp(at, frames, there) > 0)]
-        rgb = np.array([self.colour_at(frame) for frame in at]).reshape(-1, 3)
-        return at, np.linalg.norm(rgb - self.rgb, axis=1)
+        whole = np.unique(np.linspace(low, max(low, high), 1000).round())
+        whole = whole[(low <= whole) & (whole <= high) & (np.interp(whole, frames, there) > 0)]
+        rgb = np.array([self.colour_at(frame) for frame in whole]).reshape(-1, 3)
+        return whole, np.linalg.norm(rgb - self.rgb, axis=1)
 
     def alike(self) -> tuple[float, float]:
         """Return the frames between which a path stays near the picked colour."""
-        at, away = self.followed()
-        before = at[(away > ALIKE) & (at < self.frame)].max(initial=-math.inf)
-        after = at[(away > ALIKE) & (at > self.frame)].min(initial=math.inf)
-        near = at[(before < at) & (at < after)]
+        times, away = self.followed()
+        before = times[(away > ALIKE) & (times < self.frame)].max(initial=-math.inf)
+        after = times[(away > ALIKE) & (times > self.frame)].min(initial=math.inf)
+        near = times[(before < times) & (times < after)]
         start, end = near.min(initial=self.frame), near.max(initial=self.frame)
         return float(start), float(end)
 
@@ -295,11 +295,11 @@ def check(pick: Pick, frames: tuple[int, int, int]) -> None:
 
 
 def _fields_of(thing: Pick | PathKey | Area) -> dict[str, Any]:
-    found = {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing)}
-    left_out = {f.name for f in dataclasses.fields(thing) if found[f.name] == f.default}
+    values = {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing)}
+    left_out = {f.name for f in dataclasses.fields(thing) if values[f.name] == f.default}
     return {
         _NAMES.get(name, name): _plain(value, name in _WHOLE)
-        for name, value in found.items()
+        for name, value in values.items()
         if name not in left_out
     }
 
@@ -307,7 +307,7 @@ def _fields_of(thing: Pick | PathKey | Area) -> dict[str, Any]:
 def _plain(value: Any, whole: bool) -> Any:
     """Return a JSON value; whole numbers become int, so that the file has 40 and not 40.0."""
     if isinstance(value, tuple):
-        return [_plain(each, whole) for each in value]
+        return [_plain(part, whole) for part in value]
     if isinstance(value, PathKey | Area):
         return _fields_of(value)
     return int(value) if whole and float(value).is_integer() else value

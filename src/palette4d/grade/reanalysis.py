@@ -48,8 +48,8 @@ def save(fields: Fields, path: Path, *, on_edits: OnEdits = "refuse") -> tuple[S
     extra = fields.get("extra") or before["extra"]
     if (moved := _with_same_handles(former, new)) is not None:
         done, undone = history_of(before, str(target))
-        found = {**moved.fields(done, undone), "extra": extra}
-        return sidecar.save(found, target, on_edits="drop", replaces=read), []
+        kept_fields = {**moved.fields(done, undone), "extra": extra}
+        return sidecar.save(kept_fields, target, on_edits="drop", replaces=read), []
     copy, notes = _copied(former, new)
     kept = _former(target, read)
     if not kept.exists():
@@ -58,8 +58,8 @@ def save(fields: Fields, path: Path, *, on_edits: OnEdits = "refuse") -> tuple[S
     notes.append(f"the former palette with its edits is kept in {kept.name}")
     step = difference(new.state, copy.state, "copy the grade of the former analysis").undoable()
     steps: list[Edit] = [step] if step.changes else []
-    found = {**copy.fields(steps), "extra": extra}
-    return sidecar.save(found, target, on_edits="drop", replaces=read), notes
+    kept_fields = {**copy.fields(steps), "extra": extra}
+    return sidecar.save(kept_fields, target, on_edits="drop", replaces=read), notes
 
 
 def _copied(former: Grade, new: Grade) -> tuple[Grade, list[str]]:

@@ -97,10 +97,10 @@ def mismatches(document: Document, clip: Clip, whole: bool) -> list[str]:
     `whole`: the clip was opened with all its frames, not with a range.
     """
     sidecar = document.grade.core
-    found = []
+    notes = []
     size = f"{sidecar.clip['width']}x{sidecar.clip['height']}"
     if size != f"{clip.width}x{clip.height}":
-        found.append(
+        notes.append(
             f"the sidecar was made from {size} pixels, this clip has {clip.width}x{clip.height}; "
             "edits apply to colours, so the render goes on. Check that this is the clip you mean"
         )
@@ -108,16 +108,16 @@ def mismatches(document: Document, clip: Clip, whole: bool) -> list[str]:
     spans = f"the sidecar spans frames {first:g} to {last:g}"
     outside = [frame for frame in clip.frames if not first <= frame <= last]
     if outside:
-        found.append(
+        notes.append(
             f"{spans}, the frames to render are {describe(clip.frames)}; {describe(outside)} "
             f"{'takes' if len(outside) == 1 else 'take'} the palette of the nearest end"
         )
     elif whole and len(clip.frames) > 1 and (first, last) != (clip.frames[0], clip.frames[-1]):
-        found.append(
+        notes.append(
             f"{spans}, this clip has {describe(clip.frames)}; each frame takes the palette of its "
             "own number. Check that this is the clip you mean"
         )
-    return found
+    return notes
 
 
 @dataclass

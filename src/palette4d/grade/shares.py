@@ -37,19 +37,19 @@ def track_shares(clip: ClipColours, tracks: Iterable[Track]) -> dict[str, Share]
     polytope = clip.polytope
     of_vertex = np.array([row_of[id_] for id_ in polytope.vertex_ids], int)
     of_edge = np.array([*(row_of[id_] for id_ in polytope.edge_ids), -1], int)
-    found = np.zeros((len(tracks), len(clip.frames)))
-    there = np.zeros(found.shape, bool)
+    shares = np.zeros((len(tracks), len(clip.frames)))
+    there = np.zeros(shares.shape, bool)
     for k, (frame, rgbw) in enumerate(zip(clip.frames, clip.colours, strict=True)):
         cut = _core.slice_at(polytope, frame)
         weights = _core.palette_weights(rgbw[:, :3], cut.rgb, cut.faces)[0]
         rows = np.where(cut.edges < 0, of_vertex[cut.ends[:, 0]], of_edge[cut.edges])
-        np.add.at(found[:, k], rows, rgbw[:, 3] @ weights / rgbw[:, 3].sum())
+        np.add.at(shares[:, k], rows, rgbw[:, 3] @ weights / rgbw[:, 3].sum())
         there[rows, k] = True
     if not clip.frames:
         return {}
-    mean = found.sum(axis=1) / there.sum(axis=1).clip(1)
-    most = found.argmax(axis=1)
+    mean = shares.sum(axis=1) / there.sum(axis=1).clip(1)
+    most = shares.argmax(axis=1)
     return {
-        track.name: Share(float(mean[row]), float(found[row, at]), float(clip.frames[at]))
-        for row, (track, at) in enumerate(zip(tracks, most, strict=True))
+        track.name: Share(float(mean[row]), float(shares[row, index]), float(clip.frames[index]))
+        for row, (track, index) in enumerate(zip(tracks, most, strict=True))
     }

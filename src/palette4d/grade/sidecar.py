@@ -150,7 +150,7 @@ def up_to_date(members: Fields) -> Fields:
 
 
 def _whole(value: Any) -> Any:
-    return [int(one) for one in value] if isinstance(value, list) else int(value)
+    return [int(number) for number in value] if isinstance(value, list) else int(value)
 
 
 def has_edits(document: Mapping[str, Any]) -> bool:

@@ -130,10 +130,10 @@ def runs_of(chain: Chain, frames: Sequence[float], labels: Sequence[str]) -> lis
     frames, labels : sequence
         Of all vertices.
     """
-    found = [tuple(run) for _, run in itertools.groupby(chain.vertices, lambda v: labels[v])]
-    ends = [(frames[a[-1]] + frames[b[0]]) / 2 for a, b in itertools.pairwise(found)]
+    runs = [tuple(run) for _, run in itertools.groupby(chain.vertices, lambda v: labels[v])]
+    ends = [(frames[a[-1]] + frames[b[0]]) / 2 for a, b in itertools.pairwise(runs)]
     times = itertools.pairwise([chain.first, *ends, chain.last])
-    return [Run(run, *time) for run, time in zip(found, times, strict=False)]
+    return [Run(run, *time) for run, time in zip(runs, times, strict=False)]
 
 
 def plain(name: str) -> str:

@@ -53,7 +53,7 @@ def remove_version(grade: Grade, name: str) -> Grade:
 def free_name(grade: Grade, name: str) -> str:
     """Return a name that no version has."""
     names = (name[: LONGEST_NAME - 4] + more for more in _suffixes())
-    return next(each for each in names if each not in grade.versions)
+    return next(candidate for candidate in names if candidate not in grade.versions)
 
 
 def _suffixes() -> Iterator[str]:
