@@ -24,6 +24,8 @@ from palette4d.studio.window import Window
 DATA = re.compile(
     r"^([\W\d_]*|[A-Zh]|[vsep]\d+|#?[0-9a-f]{6}|\d+(\.\d+)?|/ \d+.*|.*(\.p4d\.json|####).*"
     r"|Kdenlive|Shotcut|cube|side|wipe|skew|static|paper|rgbt|[$]OCIO|Float|Close"
+    r"|by-rates|frame-for-frame|auto|none|linear|log|palette|clf|resolve_cube|hold|black|error"
+    r"|prores\d+(hq)?|dnxhr-\w+|h264|hevc|\d+-\d+x\d+.*"
     r"|Scroll (Left|Right)|Qt.*"
     r"|.*(sRGB|ocio|P3|Rec|ACES|XYZ|palette4d ).*|/.*)$"
 )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from palette4d.studio.window import Window
 
 
@@ -21,3 +23,16 @@ def test_the_window_fits_a_screen_of_1920_pixels_at_200_percent(window: Window) 
     window.resize(1800, 900)
     assert all(widget.isVisible() for widget in [*bar.buttons.values(), *always])
     assert bar.look.y() == bar.compare["after"].y()
+
+
+def test_the_bar_never_lies_over_the_picture(opened: Window, qtbot: Any) -> None:
+    window, viewer, bar = opened, opened.viewer, opened.transport
+    window.resize(1600, 1000)
+    window.arrange()
+    qtbot.wait(50)
+    for size in ((1000, 600), (1600, 1000), (900, 560)):
+        window.resize(*size)
+        qtbot.wait(50)
+        qtbot.waitUntil(lambda: bar.y() > viewer.geometry().bottom())
+        seen = [*bar.compare.values(), bar.look, bar.exposure]
+        assert all(bar.rect().contains(widget.geometry()) for widget in seen)

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+import argparse
+import os
+import re
+import shutil
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtWidgets import QCheckBox, QComboBox, QLineEdit
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QCheckBox, QComboBox, QLineEdit, QMessageBox
 
+from palette4d.cli.main import build_parser
 from palette4d.studio import texts
+from palette4d.studio.choice import SearchChoice
 from palette4d.studio.verb_dialog import VerbDialog
 from palette4d.studio.window import Window
 
@@ -31,8 +42,10 @@ def test_the_options_of_an_analysis(opened: Window, sidecar: Path) -> None:
     enter(dialog, "--method", "paper")
     enter(dialog, "--set", "a=1  b=2")
     added = ["--vertices", "9", "--method", "paper", "--set", "a=1", "--set", "b=2"]
-    assert dialog.words() == ["analyze", clip, "-o", str(sidecar), *added, "--keep-edits"]
-    assert dialog.command.text().endswith("--set b=2 --keep-edits")
+    assert dialog.words() == ["analyze", clip, "-o", str(sidecar), "--keep-edits", *added]
+    assert dialog.command.text().endswith(
+        "--keep-edits --vertices 9 --method paper --set a=1 --set b=2"
+    )
 
 
 def test_shots_go_to_a_folder(opened: Window, sidecar: Path) -> None:
@@ -41,20 +54,36 @@ def test_shots_go_to_a_folder(opened: Window, sidecar: Path) -> None:
     assert isinstance(shots, QCheckBox)
     shots.setChecked(True)
     assert dialog.value("-o") == str(sidecar.with_name("clip_shots"))
-    assert dialog.words()[-1] == "--detect-shots"
+    assert "--detect-shots" in dialog.words()
     shots.setChecked(False)
     assert dialog.value("-o") == str(sidecar)
 
 
-def test_escape_stops_what_runs_and_the_dialog_says_so(
+def answer(dialog: VerbDialog, text: str) -> None:
+    """Push a button of the question that is open."""
+    box = dialog.findChild(QMessageBox)
+    assert isinstance(box, QMessageBox)
+    assert box.isVisible()
+    assert box.text() == texts.STOP_ASKED
+    next(button for button in box.buttons() if button.text() == text).click()
+
+
+def test_escape_asks_and_stops_what_runs_and_the_dialog_says_so(
     opened: Window, tmp_path: Path, qtbot: Any
 ) -> None:
     dialog = opened.verbs.analyze_again()
     line = dialog.entry("-o")
     assert isinstance(line, QLineEdit)
     line.setText(str(tmp_path / "again.p4d.json"))
+    dialog.activateWindow()
+    qtbot.waitUntil(dialog.isActiveWindow)
     dialog.start()
-    dialog.reject()
+    QTest.keyClick(dialog, Qt.Key.Key_Escape)
+    answer(dialog, texts.GO_ON)
+    qtbot.waitUntil(lambda: dialog.findChild(QMessageBox) is None)
+    assert dialog.stage.text() != texts.STOPPING
+    QTest.keyClick(dialog, Qt.Key.Key_Escape)
+    answer(dialog, texts.STOP_JOB)
     assert dialog.stage.text() == texts.STOPPING
     qtbot.waitUntil(lambda: dialog.stage.text() == texts.CANCELLED, timeout=30_000)
     assert dialog.isVisible()
@@ -64,7 +93,7 @@ def test_escape_stops_what_runs_and_the_dialog_says_so(
 
 def test_a_failed_analysis_offers_the_fields_that_help(opened: Window, qtbot: Any) -> None:
     dialog = opened.verbs.analyze_again()
-    edits = dialog.inputs[-2]
+    edits = dialog.inputs[[field.label for field in dialog.fields].index(texts.EDITS)]
     assert isinstance(edits, QComboBox)
     kept = opened.session.document
     assert kept is not None
@@ -75,9 +104,142 @@ def test_a_failed_analysis_offers_the_fields_that_help(opened: Window, qtbot: An
     qtbot.waitUntil(lambda: dialog.stage.text() == texts.FAILED, timeout=30_000)
     assert f"'{texts.EDITS}: {texts.EDITS_NAMES[1]}'" in dialog.log.toPlainText()
     dialog.offers[0].click()
-    assert dialog.words()[-1] == "--keep-edits"
+    assert "--keep-edits" in dialog.words()
     assert edits.hasFocus()
     dialog.start()
     assert not dialog.offers
     qtbot.waitUntil(lambda: dialog.stage.text() != texts.RUNNING, timeout=60_000)
     dialog.reject()
+
+
+#: Arguments that a window does not ask: work on a farm, and files of a whole show.
+NOT_ASKED = {"cluster", "jobs", "edl", "otio", "clip"}
+SOURCES = Path(__file__).resolve().parent.parent.parent
+
+
+def named_arguments() -> set[str]:
+    """The arguments that any message names."""
+    files = [
+        path
+        for room in ("src", "analysis", "lut_export")
+        for path in (SOURCES / room).rglob("*.py")
+    ]
+    pattern = re.compile(r"\bArg\(\s*[\"'](\w+)")
+    return {name for path in files for name in pattern.findall(path.read_text(encoding="utf-8"))}
+
+
+@pytest.mark.parametrize("action", ["analyze", "render", "bake", "export", "config", "install"])
+def test_every_argument_that_a_message_names_is_a_field(opened: Window, action: str) -> None:
+    dialog = opened.action(action)()
+    assert isinstance(dialog, VerbDialog)
+    shows = opened.verbs.analyze_show("edit.edl") if action == "analyze" else dialog
+    parser = build_parser(dialog.verb)
+    verbs = next(a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
+    fields = (*dialog.fields, *shows.fields)
+    offered = {word for field in fields for word in (field.flag, *field.choices)}
+    named = named_arguments()
+    assert "process_space" in named
+    for option in verbs.choices[dialog.verb]._actions:
+        if option.dest in named - NOT_ASKED:
+            assert offered & set(option.option_strings), option.dest
+
+
+def test_an_analysis_asks_four_things_and_more_shows_the_rest(opened: Window) -> None:
+    dialog = opened.verbs.analyze()
+    dialog.show()
+    seen = [
+        field.flag
+        for field, entry in zip(dialog.fields, dialog.inputs, strict=True)
+        if entry.isVisible()
+    ]
+    assert seen == ["", "-o", "--frames", "--input-space"]
+    dialog.more.click()
+    assert all(entry.isVisible() for entry in dialog.inputs)
+
+
+def test_colour_spaces_and_formats_are_searched(opened: Window, qtbot: Any) -> None:
+    dialog = opened.verbs.analyze()
+    spaces = dialog.entry("--input-space")
+    assert isinstance(spaces, SearchChoice)
+    dialog.activateWindow()
+    qtbot.waitUntil(dialog.isActiveWindow)
+    spaces.setFocus()
+    QTest.keyClicks(spaces, "logc4")
+    found = spaces.completer().completionModel()
+    names = [found.data(found.index(row, 0)) for row in range(found.rowCount())]
+    assert "ARRI LogC4" in names
+    assert all("logc4" in name.lower() for name in names)
+    spaces.setEditText("ARRI LogC4")
+    assert dialog.words()[-2:] == ["--input-space", "ARRI LogC4"]
+    formats = opened.verbs.export().entry("--format")
+    assert isinstance(formats, SearchChoice)
+    formats.showPopup()
+    assert "resolve_cube" in [formats.itemText(k) for k in range(formats.count())]
+
+
+def test_a_sudden_cut_has_a_button_that_allows_it(
+    window: Window, tmp_path: Path, qtbot: Any
+) -> None:
+    folder = tmp_path / "two"
+    folder.mkdir()
+    rng = np.random.default_rng(0)
+    for number in range(1, 13):
+        pixels = np.zeros((36, 64, 3), np.uint8)
+        pixels[:, :, 0 if number < 7 else 2] = rng.integers(150, 250, (36, 64))
+        image = oiio.ImageBuf(oiio.ImageSpec(64, 36, 3, oiio.UINT8))
+        image.set_pixels(oiio.ROI(0, 64, 0, 36, 0, 1, 0, 3), pixels)
+        image.write(str(folder / f"two.{number:04d}.png"))
+    window.open_path(str(folder))
+    (dialog,) = window.verbs.dialogs
+    dialog.start()
+    qtbot.waitUntil(lambda: dialog.stage.text() == texts.FAILED, timeout=60_000)
+    assert "sudden cut" in dialog.log.toPlainText()
+    allow = next(
+        button for button in dialog.offers if button.text() == texts.OFFERS["--allow-cuts"]
+    )
+    allow.click()
+    qtbot.waitUntil(lambda: window.session.document is not None, timeout=60_000)
+    # What was noted stays in sight when the dialog has closed.
+    assert window.session.status.level == "warning"
+    assert "sudden cut" in window.session.status.text
+
+
+def test_undo_brings_back_the_palette_before_an_analysis(
+    opened: Window, sidecar: Path, qtbot: Any
+) -> None:
+    session = opened.session
+    before = sidecar.read_bytes()
+    dialog = opened.verbs.analyze_again()
+    enter(dialog, "--vertices", "9")
+    dialog.start()
+    qtbot.waitUntil(lambda: not opened.verbs.dialogs, timeout=120_000)
+    after = sidecar.read_bytes()
+    assert after != before
+    opened._do("undo")
+    assert sidecar.read_bytes() == before
+    assert session.document is not None
+    ids = session.document.grade.core.polytope.vertex_ids
+    opened._do("redo")
+    assert sidecar.read_bytes() == after
+    # An edit after it is undone first.
+    first = session.document.grade.core.polytope.vertex_ids[0]
+    session.edit(lambda document: document.shift(first, by=(0.1, 0, 0)))
+    opened._do("undo")
+    assert len(session.document.grade.core.polytope.vertex_ids) == 9
+    opened._do("undo")
+    assert session.document.grade.core.polytope.vertex_ids == ids
+    assert sidecar.read_bytes() == before
+
+
+def test_where_media_are_read_only_another_place_is_proposed(
+    window: Window, analysed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(analysed / "clip", tmp_path / "media")
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    real = os.access
+    monkeypatch.setattr(
+        os, "access", lambda path, mode: real(path, mode) and Path(path) != tmp_path / "media"
+    )
+    window.open_path(str(tmp_path / "media"))
+    (dialog,) = window.verbs.dialogs
+    assert dialog.value("-o") == str(tmp_path / "home" / "palette4d" / "frame.p4d.json")

@@ -1,6 +1,7 @@
 """What a dropped or chosen path stands for, and the names of files beside it."""
 
 import contextlib
+import os
 from pathlib import Path
 
 from palette4d import _core
@@ -8,11 +9,27 @@ from palette4d.media import clip_sequence
 from palette4d.media.clip import ClipError
 from palette4d.media.clip_sequence import ImageSequence
 
+#: In the user's home: what cannot stand beside its clip.
+OWN_FOLDER = "palette4d"
+
 
 def beside(path: Path, ending: str) -> str:
     """Return a file's name with another ending, in the same folder."""
     stem = path.name.removesuffix(".p4d.json")
     return str(path.with_name(stem + ending))
+
+
+def place_for(path: Path) -> Path:
+    """Return a file that can be written: this one, or one of its name in the folder of the user.
+
+    Folders of media are often read-only.
+    """
+    folder = path.absolute().parent
+    while not folder.exists():
+        folder = folder.parent
+    if os.access(folder, os.W_OK) and (not path.exists() or os.access(path, os.W_OK)):
+        return path
+    return Path.home() / OWN_FOLDER / path.name
 
 
 def sequence_of(path: str) -> str:

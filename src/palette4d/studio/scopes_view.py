@@ -90,6 +90,7 @@ class Scopes(QWidget):
     def _button(self, row: QHBoxLayout, text: str, tip: str) -> QToolButton:
         button = QToolButton()
         button.setText(text)
+        button.setMinimumWidth(40)  # on a small screen words are cut, not the picture's room
         button.setToolTip(tip)
         button.setCheckable(True)
         button.clicked.connect(self._chosen)

@@ -21,6 +21,8 @@ OWN_CLIP = "File > Find the clip… opens the palette's own"
 LACKS_FRAMES = "the clip lacks {count} frames of the palette, the first is {first}"
 UNDONE = "undone"
 REDONE = "redone"
+ANALYSIS_UNDONE = "the palette before the last analysis is back"
+ANALYSIS_REDONE = "the palette of the last analysis is back"
 MERGED = "another program edited the file too; the edits of both are kept"
 RELOADED = "another program edited the file; its edits are shown"
 BROKEN = "Another program wrote a file that cannot be used; your edits are kept here."
@@ -267,6 +269,9 @@ SAME_COMMAND = "The same on the command line:"
 COPY = "Copy"
 CLOSE = "Close"
 STOP_JOB = "Stop"
+STOP_ASKED = "Stop what is running? Files that are not finished are removed."
+GO_ON = "Let it run"
+MORE = "More"
 CHOOSE = "Choose…"
 RUNNING = "running"
 STOPPING = "stopping"
@@ -297,37 +302,80 @@ VERTICES_HINT = "all that are worth it"
 SPACE_HINT = "as the file says"
 EDITS = "Edits of an existing sidecar"
 EDITS_NAMES = ("refuse if there are any", "keep", "drop")
-MEDIA_HINT = "where the edit says"
-LIKE_HINT = "a new palette"
-METHOD_HINT = "the best"
+MEDIA_HINT = "the paths in the edit"
+RATE_HINT, EDL_RATE_HINT = "the clip's", "24"
+HEAD_TAIL_HINT, ONLY_HINT = "0", "all shots"
+CONFORM_HINT = "by the rates"
+LIKE_HINT = "no: a new palette"
+METHOD_HINT = "the best palette (skew)"
+MATRIX_HINT = "what the movie states; else 709 for HD, 601 for SD"
+LAYER_HINT = "of an EXR with several"
 SETTINGS = "Settings"
 SETTINGS_HINT = "NAME=VALUE, see palette4d analyze --help-all"
 COMPARE_LABEL = "With the source"
-BITS = "Bits a sample"
 BITS_HINT = "as the clip"
 NO_COMPARE = "no"
-FORMAT = "Format"
+CODEC_HINT = "by the extension"
+CRF_HINT = "14; 0 is lossless"
+MISSING = "A missing frame shows"
+MISSING_HINT = "the frame before"
+FORMAT_HINT = "by the extension"
+SIZE_HINT = "33, or 65 with picks"
+SHAPER_HINT = "auto"
+DOMAIN_HINT = "LOW HIGH; the frame and the palette"
+LUT_SPACE_HINT = "the clip's"
+LUT_CLIP_HINT = "the sidecar's"
+NO_EVERY_HINT = "1-100x10, in place of every n-th"
+BASE_HINT = "ACES studio"
+PROCESS_SPACE_HINT = "by the sidecar's encoding"
+MIDDLE_HINT = "the middle frame alone"
+NAMES_HINT = "the clips' names"
+ALSO_DONE = "Also shots that have a sidecar"
 LINK = "Link, do not copy"
+#: Buttons for advised options that have a short word.
+OFFERS = {"--allow-cuts": "Allow", "--skip-bad-frames": "Skip these frames"}
 #: The fields that arguments of the API have in the dialogs, by name or with their value.
 FIELDS = {
     'on_edits="keep"': f"{EDITS}: {EDITS_NAMES[1]}",
     'on_edits="drop"': f"{EDITS}: {EDITS_NAMES[2]}",
-    "detect_shots": "Split at cuts, a sidecar a shot",
+    "detect_shots": "Split at cuts; one sidecar per shot",
     "frames": "Frames",
+    "frame": "Frame",
+    "rate": "Frames per second",
+    "handles": "Head and tail frames",
+    "only": "Shots",
+    "conform": "Movies of other rates play",
     "skip_bad_frames": "Skip bad frames",
     "allow_cuts": "Allow cuts",
     "input_space": "Clip's colour space",
     "palette_space": "Palette's colour space",
+    "process_space": "Clips' colour space in the config",
+    "space": "LUT's colour space",
     "ocio_config": "OpenColorIO config",
+    "matrix": "Y'CbCr matrix",
+    "layer": "Layer",
     "vertices": "Most handles",
     "method": "Method",
-    "like": "Like an earlier version",
-    "media": "Media of the edit",
+    "like": "Keep the colours of a sidecar",
+    "media": "Folder of the media",
+    "clip": "Clip",
     "force": "Replace existing files",
+    "skip_existing": "Keep finished files",
     "half": "Half floats (EXR)",
-    "size": "Grid points",
+    "bits": "Bits per sample",
+    "codec": "Codec",
+    "crf": "Quality (CRF)",
+    "format": "Format",
+    "size": "Samples per side",
+    "shaper": "Shaper",
+    "domain": "Shaper covers",
     "every": "Every n-th frame",
+    "stops": "Where the edit turns",
+    "names": "Names of the shots",
+    "anyway": "Write it even if frames between differ",
     "base": "Config to extend",
+    "dest": "Folder",
+    "link": LINK,
 }
 
 # --------------------------------------------------------------------------------------- the help

@@ -271,6 +271,8 @@ class Transport(QWidget):
                     widget.setVisible(k >= least)
             if self._rows.minimumSize().width() <= self.width():
                 break
+        # Its layout asks for nothing: the bar does, or it would lie over the picture.
+        self.setFixedHeight(self._rows.minimumSize().height())
         super().resizeEvent(event)
 
     def _number(

@@ -1,11 +1,11 @@
 """Dialogs of the long work: options, the command line that does the same, progress, and a stop."""
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFontDatabase, QGuiApplication
 from PySide6.QtWidgets import (
     QCheckBox,
@@ -16,19 +16,25 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QLineEdit,
+    QMessageBox,
     QPlainTextEdit,
     QProgressBar,
     QPushButton,
+    QToolButton,
     QVBoxLayout,
     QWidget,
 )
 
 from palette4d.studio import texts, theme
-from palette4d.studio.choice import Choice
+from palette4d.studio.choice import Choice, SearchChoice
 from palette4d.studio.job import Job, command_line
 from palette4d.studio.paths import sequence_of
 
-FieldKind = Literal["text", "words", "save", "open", "folder", "choice", "check"]
+FieldKind = Literal["text", "words", "values", "save", "open", "folder", "choice", "check"]
+Entry = QLineEdit | QComboBox | QCheckBox
+
+#: Options that a button enters and runs with at once: nothing is lost by them.
+RUN_AT_ONCE = ("--allow-cuts", "--skip-bad-frames")
 
 
 @dataclass(frozen=True)
@@ -42,7 +48,7 @@ class Field:
     text : str
         Its label, if `texts.FIELDS` has none.
     kind : str
-        How it is entered; "words" repeats the option for each word.
+        How it is entered; "words" repeats the option for each word, "values" gives all words.
     value : str
         Its first value; "yes" ticks a check box.
     choices : tuple of str
@@ -51,6 +57,10 @@ class Field:
         Shown where the field is empty.
     names : tuple of str
         What the choices are called, if not by their values.
+    listed : callable, optional
+        Returns a list of values for the dialog, which can be searched.
+    more : bool
+        It is shown by *More* only.
     """
 
     flag: str
@@ -60,6 +70,8 @@ class Field:
     choices: tuple[str, ...] = ()
     hint: str = ""
     names: tuple[str, ...] = ()
+    listed: "Callable[[VerbDialog], Iterable[str]] | None" = None
+    more: bool = False
 
     @property
     def label(self) -> str:
@@ -68,7 +80,7 @@ class Field:
 
 
 class VerbDialog(QDialog):
-    """Runs one verb.
+    """Runs one verb; it tells when that is about to start.
 
     Parameters
     ----------
@@ -82,7 +94,14 @@ class VerbDialog(QDialog):
         Runs a function on the window's thread.
     done : callable, optional
         Called with the dialog after a success.
+
+    Attributes
+    ----------
+    notes : str
+        The notes and warnings of the verb.
     """
+
+    started = Signal()
 
     def __init__(
         self,
@@ -98,20 +117,30 @@ class VerbDialog(QDialog):
         self.setWindowTitle(title)
         self.setMinimumWidth(760)
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.verb, self.fields = verb, tuple(fields)
+        self.verb, self.fields = verb, tuple(sorted(fields, key=lambda field: field.more))
         self.job: Job | None = None
+        self.notes = ""
         self._post, self._done = post, done
-        self.inputs: list[QLineEdit | QComboBox | QCheckBox] = []
+        self.inputs: list[Entry] = []
         column = QVBoxLayout(self)
         column.setContentsMargins(16, 14, 16, 14)
         column.setSpacing(10)
-        form = QFormLayout()
+        self.form = form = QFormLayout()
         form.setLabelAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         form.setHorizontalSpacing(12)
         form.setVerticalSpacing(7)
         column.addLayout(form)
-        for field in fields:
+        for field in self.fields:
             form.addRow(*self._row(field))
+        self.more = QToolButton()
+        self.more.setText(texts.MORE)
+        self.more.setCheckable(True)
+        self.more.setArrowType(Qt.ArrowType.RightArrow)
+        self.more.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        self.more.toggled.connect(self._show_more)
+        if any(field.more for field in fields):
+            column.addWidget(self.more)
+        self._show_more(False)
         caption = QLabel(texts.SAME_COMMAND)
         caption.setStyleSheet(f"color: {theme.FAINT}")
         column.addWidget(caption)
@@ -170,12 +199,18 @@ class VerbDialog(QDialog):
             self.inputs.append(choice)
             choice.setAccessibleName(field.label)
             return label, choice
+        if (listed := field.listed) is not None:
+            search = SearchChoice(field.value, field.hint, lambda: listed(self))
+            search.editTextChanged.connect(self._show_command)
+            self.inputs.append(search)
+            search.setAccessibleName(field.label)
+            return label, search
         line = QLineEdit(field.value)
         line.setPlaceholderText(field.hint)
         line.textChanged.connect(self._show_command)
         line.setAccessibleName(field.label)
         self.inputs.append(line)
-        if field.kind in ("text", "words"):
+        if field.kind in ("text", "words", "values"):
             return label, line
         box = QWidget()
         row = QHBoxLayout(box)
@@ -186,6 +221,14 @@ class VerbDialog(QDialog):
         choose.clicked.connect(lambda: self._choose(line, field))
         row.addWidget(choose)
         return label, box
+
+    def _show_more(self, shown: bool) -> None:
+        """Show or hide the options that are seldom needed."""
+        arrow = Qt.ArrowType.DownArrow if shown else Qt.ArrowType.RightArrow
+        self.more.setArrowType(arrow)
+        for row, field in enumerate(self.fields):
+            self.form.setRowVisible(row, shown or not field.more)
+        self.adjustSize()
 
     def _choose(self, line: QLineEdit, field: Field) -> None:
         if field.kind == "folder":
@@ -198,29 +241,35 @@ class VerbDialog(QDialog):
             line.setText(found)
 
     def words(self) -> list[str]:
-        """Return the verb and its arguments."""
+        """Return the verb and its arguments, in the order of the command line."""
         words = [self.verb]
-        for field, widget in zip(self.fields, self.inputs, strict=True):
-            if isinstance(widget, QCheckBox):
-                words += [field.flag] if widget.isChecked() else []
+        for field, entry in zip(self.fields, self.inputs, strict=True):
+            if isinstance(entry, QCheckBox):
+                words += [field.flag] if entry.isChecked() else []
                 continue
-            if isinstance(widget, QComboBox):
-                value = str(widget.currentData())
+            value = value_of(entry)
+            each = value.split() if field.kind in ("words", "values") else [value] if value else []
+            if field.kind == "words":
+                words += [word for one in each for word in (field.flag, one)]
             else:
-                value = widget.text().strip()
-            for each in value.split() if field.kind == "words" else [value] if value else []:
-                words += [field.flag, each] if field.flag else [each]
+                words += [field.flag, *each] if field.flag and each else each
         return words
 
-    def entry(self, flag: str) -> QLineEdit | QComboBox | QCheckBox:
+    def entry(self, flag: str) -> Entry:
         """Return where an option is entered, the first of those with this flag."""
         pairs = zip(self.fields, self.inputs, strict=True)
         return next(widget for field, widget in pairs if field.flag == flag)
 
     def value(self, flag: str) -> str:
         """Return the text that was entered for an option."""
+        return value_of(self.entry(flag))
+
+    def go_to(self, flag: str) -> None:
+        """Show where an option is entered."""
         entry = self.entry(flag)
-        return entry.text().strip() if isinstance(entry, QLineEdit) else ""
+        if any(field.more for field in self.fields if field.flag == flag):
+            self.more.setChecked(True)
+        entry.setFocus()
 
     def _show_command(self) -> None:
         self.command.setText(command_line(self.words()))
@@ -228,6 +277,7 @@ class VerbDialog(QDialog):
 
     def start(self) -> None:
         """Run the verb."""
+        self.started.emit()
         self.log.clear()
         for button in self.offers:
             button.deleteLater()
@@ -260,14 +310,14 @@ class VerbDialog(QDialog):
             else:
                 self.stage.setText(texts.DONE if job.status == 0 else texts.FAILED)
             self.go.setEnabled(True)
-            if job.status != 0 and not job.cancelled:
+            if not job.cancelled:
                 self._offer(job.advised)
             self.stop.setText(texts.CLOSE)
             for entry in self.inputs:
                 entry.setEnabled(True)
         except RuntimeError:  # the dialog was closed
             return
-        self.job = None
+        self.job, self.notes = None, job.messages.strip()
         if job.status == 0 and self._done is not None:
             self._done(self)
 
@@ -277,11 +327,34 @@ class VerbDialog(QDialog):
             flag, _, value = option.partition(" ")
             for field, entry in zip(self.fields, self.inputs, strict=True):
                 if flag == field.flag or option in field.choices:
-                    button = QPushButton(field.label)
+                    text = texts.OFFERS.get(flag, f"{field.label}: {value}" if value else "")
+                    button = QPushButton(text or field.label)
                     button.setAutoDefault(False)
-                    button.clicked.connect(functools.partial(_take, entry, value or option))
+                    take = functools.partial(self._take, field, entry, value or option)
+                    button.clicked.connect(take)
                     self._offered.addWidget(button)
                     self.offers.append(button)
+
+    def _take(self, field: Field, entry: Entry, value: str) -> None:
+        """Go to an entry, and enter the advised value if there is one; run if that is all."""
+        self.more.setChecked(self.more.isChecked() or field.more)
+        entry.setFocus()
+        if isinstance(entry, QCheckBox):
+            entry.setChecked(True)
+        elif value.startswith("--") and value not in field.choices:
+            return  # which value, only the user knows
+        elif isinstance(entry, SearchChoice):
+            entry.setEditText(value)
+        elif isinstance(entry, QComboBox):
+            entry.setCurrentIndex(max(0, entry.findData(value)))
+        elif field.kind == "words":
+            name = value.split("=")[0]
+            kept = [word for word in entry.text().split() if word.split("=")[0] != name]
+            entry.setText(" ".join([*kept, value]))
+        else:
+            entry.setText(value)
+        if field.flag in RUN_AT_ONCE:
+            self.start()
 
     def _stop_or_close(self) -> None:
         if self.job is None:
@@ -291,19 +364,23 @@ class VerbDialog(QDialog):
             self.stage.setText(texts.STOPPING)
 
     def reject(self) -> None:
-        """Stop what runs, and stay to say so; else close."""
-        if self.job is not None:
-            self._stop_or_close()
-        else:
+        """Ask before what runs is stopped, and stay to say that it was; else close."""
+        if self.job is None:
             super().reject()
+            return
+        asks = QMessageBox(self)
+        asks.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        asks.setText(texts.STOP_ASKED)
+        stop = asks.addButton(texts.STOP_JOB, QMessageBox.ButtonRole.DestructiveRole)
+        asks.setDefaultButton(asks.addButton(texts.GO_ON, QMessageBox.ButtonRole.RejectRole))
+        stop.clicked.connect(lambda: None if self.job is None else self._stop_or_close())
+        asks.open()  # the work goes on, and may end meanwhile
 
 
-def _take(entry: QLineEdit | QComboBox | QCheckBox, value: str) -> None:
-    """Go to an entry, and enter the advised value if there is one."""
-    entry.setFocus()
-    if isinstance(entry, QCheckBox):
-        entry.setChecked(True)
-    elif isinstance(entry, QComboBox):
-        entry.setCurrentIndex(max(0, entry.findData(value)))
-    elif not value.startswith("--"):
-        entry.setText(value)
+def value_of(entry: Entry) -> str:
+    """Return what was entered; a check box has no text."""
+    if isinstance(entry, QLineEdit):
+        return entry.text().strip()
+    if isinstance(entry, SearchChoice):
+        return entry.currentText().strip()
+    return str(entry.currentData()) if isinstance(entry, QComboBox) else ""

@@ -1,7 +1,7 @@
 """The long work that the menus begin: each is a verb of the command line in a dialog."""
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,9 +9,11 @@ from PySide6.QtWidgets import QCheckBox, QFileDialog, QLineEdit
 
 from palette4d import _core
 from palette4d.analysis.options import METHODS
+from palette4d.common.errors import Palette4dError
 from palette4d.shows.manifest import ENDING
 from palette4d.studio import texts
-from palette4d.studio.paths import beside
+from palette4d.studio.former import Former
+from palette4d.studio.paths import beside, place_for
 from palette4d.studio.verb_dialog import Field, VerbDialog
 
 if TYPE_CHECKING:
@@ -21,6 +23,45 @@ if TYPE_CHECKING:
 KEEP_EDITS = "--keep-edits"
 #: What becomes of the edits of an existing sidecar; texts.EDITS_NAMES has their names.
 EDITS = ("", KEEP_EDITS, "--drop-edits")
+#: How an edit plays movies of other rates.
+CONFORM = ("", "by-rates", "frame-for-frame")
+SHAPERS = ("", "auto", "none", "linear", "log")
+MATRICES = ("", "601", "709", "2020")
+CODECS = ("", "prores422hq", "prores4444", "dnxhr-hqx", "dnxhr-444", "h264", "hevc")
+MISSING = ("", "hold", "black", "error")
+
+
+def spaces(flag: str, dialog: VerbDialog) -> Iterable[str]:
+    """Return the colour spaces of the config that a field has, or of the default one."""
+    from palette4d.colour.ocio_config import chosen_config
+
+    try:
+        config, _ = chosen_config(dialog.value(flag) or None)
+    except Palette4dError:  # the verb says why
+        return []
+    return map(str, config.getColorSpaceNames())
+
+
+def formats(_: VerbDialog) -> Iterable[str]:
+    """Return the formats of LUTs."""
+    from palette4d.lut_export.formats import format_names
+
+    return format_names()
+
+
+def lut_fields(*left_out: str, usual: str = "") -> list[Field]:
+    """Return the options that all LUTs have in common, without some; `usual` is the format."""
+    config_spaces = functools.partial(spaces, "--ocio-config")
+    found = [
+        Field("--format", hint=usual or texts.FORMAT_HINT, listed=formats),
+        Field("--size", hint=texts.SIZE_HINT, more=True),
+        Field("--shaper", "", "choice", "", SHAPERS, texts.SHAPER_HINT, more=True),
+        Field("--domain", kind="values", hint=texts.DOMAIN_HINT, more=True),
+        Field("--space", hint=texts.LUT_SPACE_HINT, listed=config_spaces, more=True),
+        Field("--ocio-config", kind="open", hint="$OCIO", more=True),
+        Field("--clip", kind="open", hint=texts.LUT_CLIP_HINT, more=True),
+    ]
+    return [field for field in found if field.flag not in left_out]
 
 
 class VerbMenu:
@@ -29,6 +70,7 @@ class VerbMenu:
     def __init__(self, window: "Window") -> None:
         self.window, self.session = window, window.session
         self.dialogs: list[VerbDialog] = []
+        self.former = Former(self.session)
 
     def _verb(
         self,
@@ -56,18 +98,23 @@ class VerbMenu:
             path = Path(source)
             # The name by which the node finds it, see docs/node.md.
             stem = _core.clip_name(path.name) or path.absolute().parent.name
-            out = str(path.with_name(f"{stem}.p4d.json"))
+            out = str(place_for(path.with_name(f"{stem}.p4d.json")))
         return self._analyze(texts.ANALYZE, source, out)
 
     def analyze_show(self, path: str) -> VerbDialog:
         """Find the palettes of the shots of an edit (.otio, .edl)."""
+        folder = place_for(Path(f"{Path(path).with_suffix('')}_shots"))
         return self._verb(
             texts.ANALYZE,
             "analyze",
             [
                 Field("", texts.SHOW, "open", path),
-                Field("-o", texts.FOLDER, "folder", str(Path(path).with_suffix("")) + "_shots"),
+                Field("-o", texts.FOLDER, "folder", str(folder)),
                 Field("--media", kind="folder", hint=texts.MEDIA_HINT),
+                Field("--rate", hint=texts.EDL_RATE_HINT),
+                Field("--conform", "", "choice", "", CONFORM, texts.CONFORM_HINT, more=True),
+                Field("--force", texts.ALSO_DONE, "check", more=True),
+                self._input_space(more=True),
                 *self._search_fields(),
             ],
             self._open_result,
@@ -80,37 +127,52 @@ class VerbMenu:
         )
 
     def _analyze(self, title: str, clip: str, out: str, edits: str = "") -> VerbDialog:
+        again = bool(edits)
         dialog = self._verb(
             title,
             "analyze",
             [
                 Field("", texts.CLIP, "open", clip, hint=texts.CLIP_HINT),
                 Field("-o", texts.SIDECAR, "save", out),
-                Field("--frames", hint=texts.FRAMES_HINT),
-                Field("--like", kind="open", hint=texts.LIKE_HINT),
+                Field("--frames", hint=texts.FRAMES_HINT, more=again),
+                self._input_space(),
+                Field(
+                    "", texts.EDITS, "choice", edits, EDITS, names=texts.EDITS_NAMES, more=not again
+                ),
+                Field("--like", kind="open", hint=texts.LIKE_HINT, more=True),
+                Field("--rate", hint=texts.RATE_HINT, more=True),
                 *self._search_fields(),
-                Field("", texts.EDITS, "choice", edits, EDITS, names=texts.EDITS_NAMES),
-                Field("--detect-shots", kind="check"),
+                Field("--matrix", "", "choice", "", MATRICES, texts.MATRIX_HINT, more=True),
+                Field("--layer", hint=texts.LAYER_HINT, more=True),
+                Field("--detect-shots", kind="check", more=True),
             ],
             self._open_result,
         )
+        dialog.started.connect(lambda: self.former.keep(Path(dialog.value("-o"))))
         shots = dialog.entry("--detect-shots")
         assert isinstance(shots, QCheckBox)
         shots.toggled.connect(functools.partial(self._name_output, dialog, out))
         return dialog
 
     @staticmethod
-    def _search_fields() -> list[Field]:
+    def _input_space(*, more: bool = False) -> Field:
+        listed = functools.partial(spaces, "--ocio-config")
+        return Field("--input-space", hint=texts.SPACE_HINT, listed=listed, more=more)
+
+    @classmethod
+    def _search_fields(cls) -> list[Field]:
         """Return the options that a clip and an edit have in common."""
+        listed = functools.partial(spaces, "--ocio-config")
         return [
-            Field("--vertices", hint=texts.VERTICES_HINT),
-            Field("--input-space", hint=texts.SPACE_HINT),
-            Field("--palette-space", hint=texts.SPACE_HINT),
-            Field("--ocio-config", kind="open", hint="$OCIO"),
-            Field("--method", "", "choice", "", ("", *METHODS), texts.METHOD_HINT),
-            Field("--set", texts.SETTINGS, "words", hint=texts.SETTINGS_HINT),
-            Field("--skip-bad-frames", kind="check"),
-            Field("--allow-cuts", kind="check"),
+            Field("--vertices", hint=texts.VERTICES_HINT, more=True),
+            Field("--palette-space", hint=texts.SPACE_HINT, listed=listed, more=True),
+            Field("--ocio-config", kind="open", hint="$OCIO", more=True),
+            Field("--method", "", "choice", "", ("", *METHODS), texts.METHOD_HINT, more=True),
+            Field("--set", texts.SETTINGS, "words", hint=texts.SETTINGS_HINT, more=True),
+            Field("--skip-bad-frames", kind="check", more=True),
+            Field("--allow-cuts", kind="check", more=True),
+            Field("--handles", hint=texts.HEAD_TAIL_HINT, more=True),
+            Field("--only", hint=texts.ONLY_HINT, more=True),
         ]
 
     @staticmethod
@@ -123,8 +185,8 @@ class VerbMenu:
             output.setText(wanted)
 
     def _open_result(self, dialog: VerbDialog) -> None:
-        """Open the sidecar or the manifest that was written."""
-        out = Path(dialog.value("-o"))
+        """Open the sidecar or the manifest that was written; what was noted stays in sight."""
+        out, notes = Path(dialog.value("-o")), dialog.notes
         if out.is_dir():
             written = max(out.glob(f"*{ENDING}"), key=lambda path: path.stat().st_mtime)
             self.window.open_path(str(written))
@@ -132,12 +194,16 @@ class VerbMenu:
             frame = self.session.frame
             self.window.open_path(str(out), dialog.value("") or None)
             self.session.go(frame)
+            self.former.written(out)
+        if notes:
+            self.session.say(notes, "warning")
         dialog.close()
 
     def render(self) -> VerbDialog:
         """Write the recoloured clip."""
         marks = self.session.marks
         compared = ("", "wipe", "side")
+        bits = ("", "8", "10", "16", "32")
         return self._from_sidecar(
             texts.RENDER,
             "render",
@@ -145,8 +211,14 @@ class VerbMenu:
             Field("-o", texts.OUTPUT, "save", self._beside("_graded.mp4")),
             Field("--frames", value="{}-{}".format(*marks) if marks else ""),
             Field("--compare", texts.COMPARE_LABEL, "choice", "", compared, texts.NO_COMPARE),
-            Field("--bits", texts.BITS, "choice", "", ("", "8", "16", "32"), texts.BITS_HINT),
-            Field("--half", kind="check"),
+            Field("--codec", "", "choice", "", CODECS, texts.CODEC_HINT, more=True),
+            Field("--crf", hint=texts.CRF_HINT, more=True),
+            Field("--bits", "", "choice", "", bits, texts.BITS_HINT, more=True),
+            Field("--half", kind="check", more=True),
+            Field("--space", "", "choice", "", ("", "palette"), texts.LUT_SPACE_HINT, more=True),
+            Field("--missing", texts.MISSING, "choice", "", MISSING, texts.MISSING_HINT, more=True),
+            Field("--skip-bad-frames", kind="check", more=True),
+            Field("--skip-existing", kind="check", more=True),
         )
 
     def _from_sidecar(self, title: str, verb: str, *fields: Field) -> VerbDialog:
@@ -155,7 +227,7 @@ class VerbMenu:
 
     def _beside(self, ending: str) -> str:
         assert self.session.path is not None
-        return beside(self.session.path, ending)
+        return str(place_for(Path(beside(self.session.path, ending))))
 
     def bake(self) -> VerbDialog:
         """Write a LUT of this frame."""
@@ -165,7 +237,7 @@ class VerbMenu:
             "bake",
             Field("--frame", texts.FRAME_FIELD, value=frame),
             Field("-o", texts.OUTPUT, "save", self._beside(f"_{frame}.cube")),
-            Field("--size", hint="33"),
+            *lut_fields(),
         )
 
     def export(self) -> VerbDialog:
@@ -174,8 +246,10 @@ class VerbMenu:
             texts.EXPORT,
             "export",
             Field("--every", value="1"),
+            Field("--frames", hint=texts.NO_EVERY_HINT, more=True),
+            Field("--stops", kind="check", more=True),
             Field("-o", texts.FOLDER, "folder", self._beside("_luts")),
-            Field("--format", texts.FORMAT, hint="cube"),
+            *lut_fields(usual="resolve_cube"),
         )
 
     def config(self) -> VerbDialog:
@@ -184,7 +258,18 @@ class VerbMenu:
             texts.CONFIG_WORK,
             "config",
             Field("-o", texts.FOLDER, "folder", self._beside("_config")),
-            Field("--base", kind="open"),
+            Field("--base", kind="open", hint=texts.BASE_HINT),
+            Field(
+                "--process-space",
+                hint=texts.PROCESS_SPACE_HINT,
+                listed=functools.partial(spaces, "--base"),
+            ),
+            Field("--every", hint=texts.MIDDLE_HINT),
+            Field("--frames", hint=texts.NO_EVERY_HINT, more=True),
+            Field("--stops", kind="check", more=True),
+            Field("--names", hint=texts.NAMES_HINT, more=True),
+            Field("--anyway", kind="check", more=True),
+            *lut_fields("--space", "--ocio-config", usual="clf"),
         )
 
     def install(self) -> VerbDialog:

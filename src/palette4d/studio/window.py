@@ -442,10 +442,9 @@ class Window(QMainWindow):
             *("ramp_hold", "find_clip", "copy_grade", "pick_pixel", "hold_pixel"),
         ):
             self.actions_by_name[action].setEnabled(open_)
-        self.actions_by_name["undo"].setEnabled(open_ and bool(document and document.history))
-        self.actions_by_name["redo"].setEnabled(
-            open_ and bool(document and document.history.undone)
-        )
+        past, former = None if document is None else document.history, self.verbs.former
+        self.actions_by_name["undo"].setEnabled(bool(past) or former.can_undo)
+        self.actions_by_name["redo"].setEnabled(bool(past and past.undone) or former.can_redo)
         for action in ("reset_selected", "lock", "add_stop", "act_from", "act_until"):
             self.actions_by_name[action].setEnabled(open_ and bool(session.selection))
         many = self.shots.count() > 1

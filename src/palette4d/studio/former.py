@@ -1,0 +1,91 @@
+"""The sidecar as it was before it was analysed again: undo brings it back. It knows no toolkit."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from palette4d.common.files import replacing
+from palette4d.grade.edits import Edit
+from palette4d.studio import texts
+from palette4d.studio.session import Session
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a file had, and the edits of the document that takes its place."""
+
+    path: Path
+    data: bytes
+    done: tuple[Edit, ...]
+
+
+class Former:
+    """Undoes and redoes analyses that wrote the session's sidecar anew."""
+
+    def __init__(self, session: Session) -> None:
+        """Begin with no analysis."""
+        self.session = session
+        self._now: tuple[Path, bytes] | None = None
+        self._past: list[Content] = []
+        self._future: list[Content] = []
+
+    def keep(self, path: Path) -> None:
+        """Keep what a file has, before an analysis writes it."""
+        self._now = (path.absolute(), path.read_bytes()) if path.is_file() else None
+
+    def written(self, path: Path) -> None:
+        """Let undo bring back what the file had; call it when the new one is open."""
+        if self._now is not None and self._now[0] == path.absolute():
+            self._past.append(Content(*self._now, self._done))
+            self._future.clear()
+        self._now = None
+
+    @property
+    def _done(self) -> tuple[Edit, ...]:
+        document = self.session.document
+        return () if document is None else document.history.done
+
+    def _is_next(self, stack: list[Content]) -> bool:
+        path = self.session.path
+        return (
+            bool(stack)
+            and path is not None
+            and (path.absolute(), self._done) == (stack[-1].path, stack[-1].done)
+        )
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether the last thing that was done is an analysis."""
+        return self._is_next(self._past)
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether the last thing that was undone is an analysis."""
+        return self._is_next(self._future)
+
+    def undo(self) -> None:
+        """Bring back the file before the analysis, or undo an edit."""
+        if self.can_undo:
+            self._change_places(self._past, self._future, texts.ANALYSIS_UNDONE)
+        else:
+            self.session.undo()
+
+    def redo(self) -> None:
+        """Bring back the file after the analysis, or redo an edit."""
+        if self.can_redo:
+            self._change_places(self._future, self._past, texts.ANALYSIS_REDONE)
+        else:
+            self.session.redo()
+
+    def _change_places(self, stack: list[Content], other: list[Content], said: str) -> None:
+        wanted = stack[-1]
+        if not self.session.save():
+            return
+        data = wanted.path.read_bytes()
+        with replacing(wanted.path, force=True) as temporary:
+            temporary.write_bytes(wanted.data)
+        stack.pop()
+        self.session.select()
+        self.session.revert()
+        self.session.go(self.session.frame)
+        other.append(Content(wanted.path, data, self._done))
+        self.session.say(said)
