@@ -8,7 +8,7 @@ import av
 import numpy as np
 import pytest
 from av.video.reformatter import ColorRange, Colorspace
-from clip_files import damage, write_movie
+from clip_files import damage, write_image, write_movie
 
 from palette4d.media import clip_movie
 from palette4d.media.clip import ClipError, FrameError, open_clip
@@ -294,6 +294,24 @@ def test_a_file_that_is_cut_short_has_the_frames_that_it_promises(tmp_path, name
     good = [image.frame for image in clip.iter_images()]
     assert clip.frames == [*good, *clip.skipped] == list(range(30))
     assert 10 < len(good) < 25
+
+
+def test_frames_with_exif(tmp_path):
+    """Side data of a type that PyAV does not know, and beside it the display matrix."""
+    frames = noise(3)
+    path = write_movie(tmp_path / "a.mov", "tiff", "rgb24", frames, "rgb24")
+    for frame, pixels in open_clip(str(path)):
+        np.testing.assert_array_equal(pixels, frames[frame].astype(np.float32) / np.float32(255))
+    jpeg = write_image(tmp_path / "a.jpg", frames[0], Orientation=6, Make="camera")
+    with av.open(str(tmp_path / "b.mov"), "w") as movie:
+        stream = movie.add_stream("mjpeg", rate=24)
+        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuvj420p"
+        packet = av.Packet(jpeg.read_bytes())
+        packet.pts = packet.dts = 0
+        packet.time_base, packet.stream, packet.is_keyframe = Fraction(1, 24), stream, True
+        movie.mux(packet)
+    shown = open_clip(str(tmp_path / "b.mov")).read(0)
+    assert np.abs(shown - open_clip(str(jpeg)).read(0)).mean() < 0.05
 
 
 def test_fragments_that_are_cut_short_are_noted(tmp_path):

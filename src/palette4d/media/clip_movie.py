@@ -17,12 +17,11 @@ from pathlib import Path
 from typing import Any
 
 import av
-import numpy as np
 from av.codec.codec import Capabilities
 from av.error import FFmpegError
 
 from palette4d import _core
-from palette4d.common.arguments import MAX_FRAMES, parse_frames
+from palette4d.common.arguments import parse_frames
 from palette4d.media.clip_base import (
     DEFAULT_RATE,
     F32,
@@ -37,8 +36,7 @@ from palette4d.media.clip_base import (
     named,
 )
 from palette4d.media.colour_tags import LUMA_WEIGHTS, MATRICES, UNKNOWN, UNREADABLE, encoding_of
-from palette4d.media.movie_boxes import boxes
-from palette4d.media.movie_length import is_cut_short, promised_frames
+from palette4d.media.movie_index import index_of, opened_movie, varies, video_stream
 from palette4d.media.movie_pixels import (
     bin_picture,
     is_luma_chroma,
@@ -49,18 +47,6 @@ from palette4d.media.movie_pixels import (
 )
 from palette4d.media.movie_stated import stated_by
 
-#: FFmpeg's names of the formats of `MOVIE_EXTENSIONS`. It recognises formats by content, and
-#: playlists such as ffconcat or HLS would lead it to other files.
-_FORMATS = (
-    *("asf", "avi", "flv", "gif", "m4v", "matroska", "mov", "mpeg", "mpegts", "mpegvideo", "mxf"),
-    *("nut", "ogg", "yuv4mpegpipe"),
-)
-#: The options of `av.open` for a movie.
-ONLY_FILES = {"format_whitelist": ",".join(_FORMATS), "protocol_whitelist": "file"}
-
-
-#: The most pictures that a codec decodes before one that is shown earlier (H.264, HEVC).
-REORDERED = 16
 #: Pictures whose decoding takes longer than opening the file again for a seek.
 WORTH_SEEKING = 4
 
@@ -200,9 +186,11 @@ class MovieClip(Clip):
         numbers = {stamp: index for index, stamp in enumerate(self.stamps or ())}
         counted = 0
         with opened_movie(self.path) as container:
-            stream = _video_stream(container, self.path)
-            # Report a damaged picture instead of concealing the damage.
-            stream.codec_context.options = {"err_detect": "crccheck+explode"}
+            stream = video_stream(container, self.path)
+            # Report a damaged picture instead of concealing the damage. FFmpeg's TIFF has errors of
+            # its own, in what becomes Exif.
+            if stream.codec_context.name != "tiff":
+                stream.codec_context.options = {"err_detect": "crccheck+explode"}
             stream.thread_type = "AUTO"
             if start and len(self.key_frames) == self.count and _has_slices(stream):
                 stream.thread_type = "SLICE"  # frame threads would decode later pictures too
@@ -245,18 +233,17 @@ def open_movie(
 ) -> MovieClip:
     """Open a movie file over the given range; raises ClipError or FrameError as `open_clip`."""
     with opened_movie(path) as container:
-        stream = _video_stream(container, path)
-        first, promised, stamps, packets, keys = _index(container, stream, path)
+        stream = video_stream(container, path)
+        index = index_of(container, stream, path)
+        first, stamps, count = index.first, index.stamps, index.count
         untagged, notes = _resolve_matrix(first, path, matrix)
         stated = stated_by(container, stream, first)
         own_rate = stream.average_rate or stream.guessed_rate or stream.base_rate
         base = stream.time_base
-        fragments = "mov" in container.format.name
-    count = max(promised, packets)
-    if not promised and fragments and is_cut_short(path):
+    if index.is_cut_short:
         notes.append(
             f"{path}: the file ends in the middle of its frames, and does not say how many are "
-            f"missing behind the {packets} that are there; bring a whole copy"
+            f"missing behind the {index.packets} that are there; bring a whole copy"
         )
     wanted = list(range(count))
     if frames is not None:
@@ -266,9 +253,10 @@ def open_movie(
                 f"{path}: asked for {named(wanted)}, the movie has "
                 f"{describe(range(count))} (its frame numbers start at 0). Choose a range inside."
             )
-    if wanted[-1] >= packets and not skip_bad_frames:
+    if wanted[-1] >= index.packets and not skip_bad_frames:
         raise FrameError(
-            f"{path}: frame {packets} is missing: the file ends after {packets} of {count} frames.",
+            f"{path}: frame {index.packets} is missing: the file ends after {index.packets} of "
+            f"{count} frames.",
             LEAVE_OUT,
         )
     height, width, channels = shape_of(first)
@@ -276,8 +264,8 @@ def open_movie(
         raise ClipError(
             f"{path}: found {width}x{height} pixels, expected at most 13000x13000; scale it down"
         )
-    varies = stamps is not None and base is not None and _varies(stamps, base, own_rate)
-    if varies:
+    uneven = stamps is not None and base is not None and varies(stamps, base, own_rate)
+    if uneven:
         notes.append(f"{path}: the frame rate varies; frames are counted, their times are not used")
     bits = max((component.bits for component in first.format.components), default=8)
     return MovieClip(
@@ -298,9 +286,9 @@ def open_movie(
         path=path,
         count=count,
         stamps=stamps,
-        key_frames=keys,
+        key_frames=index.key_frames,
         time_base=base or Fraction(1),
-        varies=varies,
+        varies=uneven,
         matrix=untagged or int(first.colorspace),
     )
 
@@ -329,115 +317,9 @@ def _resolve_matrix(picture: av.VideoFrame, path: Path, asked: str | None) -> tu
     return 0, notes
 
 
-def opened_movie(path: Path) -> Any:
-    """Open a movie file to read; ClipError if FFmpeg cannot."""
-    try:
-        # Without the protocol FFmpeg would read a name such as "cam:01.mov" as an address.
-        return av.open(f"file:{path}", mode="r", options=ONLY_FILES)
-    except (FFmpegError, OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        if isinstance(error, ValueError):  # EINVAL: not on the whitelist
-            reason = f"its content is none of {', '.join(_FORMATS)}"
-        if path.is_file() and path.stat().st_size == 0:
-            reason = "the file is empty"
-        elif _lacks_index(path):
-            raise ClipError(
-                f"{path}: the movie has no index yet: it is still being written, or its writing "
-                "was cut short; wait until it is done, or bring a whole copy"
-            ) from error
-        raise ClipError(
-            f"{path}: the movie cannot be opened ({reason}); expected a whole movie file that "
-            "FFmpeg can read. Bring a good copy, or convert it to an image sequence."
-        ) from error
-
-
-def _lacks_index(path: Path) -> bool:
-    """Whether a file is a .mov or .mp4 without the box `moov`, which is written last."""
-    try:
-        with path.open("rb") as file:
-            kinds = {kind for kind, _ in boxes(file)}
-    except OSError:
-        return False
-    return bool(kinds & {b"ftyp", b"mdat", b"wide"}) and b"moov" not in kinds
-
-
 def _has_slices(stream: Any) -> bool:
     """Whether several threads can decode one picture."""
     return bool(int(stream.codec_context.codec.capabilities) & int(Capabilities.slice_threads))
-
-
-def _video_stream(container: Any, path: Path) -> Any:
-    stream = container.streams.best("video")
-    if stream is None:
-        raise ClipError(f"{path}: found no video stream, expected one; give a movie with a picture")
-    return stream
-
-
-def _index(
-    container: Any, stream: Any, path: Path
-) -> tuple[av.VideoFrame, int, list[int] | None, int, list[int]]:
-    """First picture, frames the header promises, stamps in order, packets, and key frames."""
-    first: av.VideoFrame | None = None
-    stamps: list[int | None] = []
-    keys: set[int | None] = set()
-    discarded = 0
-    # Old VP8 files have packets without a picture; only decoding shows this.
-    by_decoding = stream.codec_context.name == "vp8"
-    try:
-        for packet in container.demux(stream):
-            if max(stream.frames, len(stamps)) > MAX_FRAMES:
-                raise ClipError(
-                    f"{path}: found more than {MAX_FRAMES} frames in the movie, expected fewer; "
-                    "cut it into parts"
-                )
-            pictures: list[Any] = []
-            if first is None or by_decoding:
-                try:
-                    pictures = packet.decode()
-                except FFmpegError:
-                    pictures = []
-                first = first or next(iter(pictures), None)
-            if packet.size == 0:
-                stamps += [picture.pts for picture in pictures if by_decoding]
-            elif packet.is_discard:
-                discarded += 1
-            elif by_decoding:
-                stamps += [picture.pts for picture in pictures]
-            elif not packet.is_corrupt or packet.pts is not None:
-                stamps.append(packet.pts)
-                if packet.is_keyframe:
-                    keys.add(packet.pts)
-    except FFmpegError:
-        pass  # the file ends in the middle; the earlier packets count
-    if first is None:
-        raise ClipError(
-            f"{path}: no frame can be decoded (codec {stream.codec_context.name}); expected a "
-            "movie with at least one whole frame. Bring a good copy, or convert it to images."
-        )
-    promised = 0
-    if not by_decoding:
-        promised = max(promised_frames(container, stream, path) - discarded, 0)
-    known = [stamp for stamp in stamps if stamp is not None]
-    if len(known) == len(stamps) == len(set(known)):
-        known.sort()
-        numbers = [number for number, stamp in enumerate(known) if stamp in keys]
-        return first, promised, known, len(stamps), numbers
-    return first, promised, None, len(stamps), []
-
-
-def _varies(stamps: list[int], base: Fraction, rate: Fraction | None) -> bool:
-    """Whether the time between frames varies by more than the rounding of time stamps."""
-    if len(stamps) < 3 or not rate:
-        return False
-    gaps = np.diff(np.asarray(stamps, dtype=np.int64)).astype(np.float64)
-    allowed = max(2.0, float(Fraction(1, 4) / (rate * base)))
-    # A stream that was trimmed without encoding lacks pictures at its ends, which others need.
-    usual = max(1.0, float(np.median(gaps)))
-    whole = np.abs(gaps - np.rint(gaps / usual) * usual) <= allowed
-    at = np.arange(len(gaps))
-    ends = np.logical_or(at < REORDERED, at >= len(gaps) - REORDERED)
-    lacks = whole & (gaps > 1.5 * usual) & ends
-    return bool(np.ptp(gaps[~lacks]) > allowed) if not lacks.all() else False
 
 
 def _fail(error: FrameError, binner: _core.ColourBinner) -> bool:

@@ -6,7 +6,7 @@ limited range has room below black and above white, and colours beyond R'G'B' 0.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import av
 import numpy as np
@@ -24,6 +24,16 @@ _PLANAR_DEPTHS = (8, 9, 10, 12, 14, 16)
 _LUMA_CHROMA = ("yuv", "nv", "p0", "p2", "p4", "yuyv", "uyvy", "yvyu", "y2", "xv", "v")
 #: Pixels of a strip that is converted at once: it stays in the processor's cache.
 _STRIP = 30_000
+
+
+def _newer(cls: type[Type], value: int) -> Type:
+    """Return a type of side data that PyAV does not know, such as Exif: it would refuse all."""
+    found: Any = object.__new__(cls)
+    found._value_, found._name_ = value, f"TYPE_{value}"
+    return cast(Type, found)
+
+
+Type._missing_ = classmethod(_newer)  # type: ignore[assignment]
 
 
 def turn(picture: av.VideoFrame) -> tuple[bool, bool, bool]:

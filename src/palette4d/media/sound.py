@@ -16,7 +16,8 @@ from typing import Any
 import av
 from av.error import FFmpegError
 
-from palette4d.media.clip_movie import MovieClip, opened_movie
+from palette4d.media.clip_movie import MovieClip
+from palette4d.media.movie_index import opened_movie
 
 _LAYOUTS = {1: "mono", 2: "stereo", 6: "5.1", 8: "7.1"}
 
