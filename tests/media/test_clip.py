@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+import struct
 import sys
 from fractions import Fraction
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
-from clip_files import grey_levels, write_image
+from clip_files import TimeCode, grey_levels, write_image
 from palette4d.analysis import pipeline
 from palette4d.analysis.options import AnalysisOptions
 
@@ -18,6 +20,8 @@ from palette4d.common.errors import Palette4dError
 from palette4d.media.clip import ClipError, FrameError, open_clip
 from palette4d.media.clip_base import as_rate, describe
 from palette4d.media.clip_sequence import frame_number
+from palette4d.media.frame_writer import write_frame
+from palette4d.media.timecode import start_timecode
 
 
 def reds(clip) -> dict[int, int]:
@@ -530,3 +534,34 @@ def test_one_frame_is_no_frames(tmp_path):
         open_clip(str(tmp_path), skip_bad_frames=True)
     with pytest.raises(ClipError, match="found no frame 9, the clip has 3"):
         open_clip(str(tmp_path), frames="9")
+
+
+@pytest.mark.parametrize("grey", [0x10, 0x42])
+def test_a_dpx_of_ffmpeg(tmp_path, grey):
+    """Its pixels begin where others have a rate and a timecode: 48.6 per second, 10:10:10:10."""
+    codec = av.CodecContext.create("dpx", "w")
+    codec.width, codec.height, codec.pix_fmt, codec.time_base = 16, 32, "rgb24", Fraction(1, 25)
+    pixels = np.full((32, 16, 3), grey, np.uint8)
+    (packet,) = codec.encode(av.VideoFrame.from_ndarray(pixels, "rgb24"))
+    (tmp_path / "a.0001.dpx").write_bytes(bytes(packet))
+    clip = open_clip(str(tmp_path / "a.####.dpx"))
+    assert (clip.rate, start_timecode(clip), clip.stated.pixel_aspect) == (24, None, 1)
+    image = clip.load(1)
+    assert not [name for name, _, _ in image.metadata if "TimeCode" in name or "Rate" in name]
+    write_frame(tmp_path / "b.exr", image.pixels, "float", metadata=image.metadata)
+    copy = open_clip(str(tmp_path / "b.exr"))
+    np.testing.assert_array_equal(copy.read(copy.frames[0]), pixels.astype(np.float32) / 255)
+
+
+@pytest.mark.parametrize("bits", [0x14517214, 0x24000000, 0x00600000])
+def test_a_timecode_that_cannot_be_is_none(tmp_path, bits):
+    path = tmp_path / "a.0001.dpx"
+    pixels = np.zeros((8, 16, 3), np.uint8)
+    write_image(path, pixels, smpte__TimeCode=TimeCode(0x10203004), dpx__FrameRate=25.0)
+    assert start_timecode(open_clip(str(path))) == "10:20:30:04"
+    data = path.read_bytes()
+    order = ">" if data[:4] == b"SDPX" else "<"
+    path.write_bytes(
+        data.replace(struct.pack(f"{order}I", 0x10203004), struct.pack(f"{order}I", bits))
+    )
+    assert start_timecode(open_clip(str(path))) is None

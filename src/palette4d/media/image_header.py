@@ -31,6 +31,11 @@ _STORAGE = (
     *("dpx:ImageDescriptor", "dpx:LowData", "dpx:HighData", "dpx:DittoKey"),
 )
 _RATE_NAMES = ("FramesPerSecond", "dpx:FrameRate", "dpx:TemporalFrameRate")
+#: The bytes of all headers of a DPX (SMPTE ST 268), and the attributes of the first one.
+_ALL_OF_DPX = 2048
+_FIRST_OF_DPX = ("dpx:Transfer", "dpx:Colorimetric", "dpx:InputDevice")
+#: OpenEXR writes no pixel aspect ratio below it.
+_LEAST_ASPECT = 1e-6
 _DEPTHS = {"uint": "uint32", "int": "int32"}
 
 
@@ -95,6 +100,8 @@ def opened(path: Path, what: str, reading: Reading) -> tuple[Any, Any, list[int]
             )
         raise unreadable(path, what, problem)
     spec, layer = _part(source, path, reading)
+    if source.format_name() == "dpx":
+        spec = _without_pixels(path, spec)
     if spec.deep:
         source.close()
         raise FrameError(
@@ -113,6 +120,24 @@ def opened(path: Path, what: str, reading: Reading) -> tuple[Any, Any, list[int]
                 path, what, f"{width}x{height} pixels in {channels} channels are too many"
             )
     return source, spec, chosen
+
+
+def _without_pixels(path: Path, spec: Any) -> Any:
+    """Return a DPX's header without attributes that are pixels.
+
+    FFmpeg writes the first header alone. OpenImageIO reads the others where the picture is: rates
+    and timecodes of film and television.
+    """
+    with path.open("rb") as file:
+        head = file.read(8)
+    begin = int.from_bytes(head[4:], "little" if head[:4] == b"XPDS" else "big")
+    if begin >= _ALL_OF_DPX:
+        return spec
+    spec = spec.copy()
+    for name in [param.name for param in spec.extra_attribs]:
+        if name.startswith(("dpx:", "smpte:")) and not name.startswith(_FIRST_OF_DPX):
+            spec.erase_attribute(name)
+    return spec
 
 
 def _part(source: Any, path: Path, reading: Reading) -> tuple[Any, list[int] | None]:
@@ -188,7 +213,7 @@ def header_of(spec: Any, chosen: list[int], part: int) -> Header:
         metadata=tuple(
             (param.name, param.type, oiio_text.readable(param.value))
             for param in spec.extra_attribs
-            if param.name == "oiio:ColorSpace" or not param.name.startswith(_STORAGE)
+            if _is_kept(param)
         ),
         note=_note(spec, chosen),
         tags=tags,
@@ -196,6 +221,13 @@ def header_of(spec: Any, chosen: list[int], part: int) -> Header:
         channels=tuple(spec.channelnames[channel] for channel in chosen),
         more=described(spec, chosen, spec.get_int_attribute("oiio:subimages", 1)),
     )
+
+
+def _is_kept(param: Any) -> bool:
+    """Whether a recoloured copy keeps an attribute; FFmpeg's DPX has a pixel aspect ratio of 0."""
+    if param.name == "PixelAspectRatio":
+        return bool(_LEAST_ASPECT < param.value < 1 / _LEAST_ASPECT)
+    return param.name == "oiio:ColorSpace" or not param.name.startswith(_STORAGE)
 
 
 def _colours(spec: Any) -> tuple[str, ColourTags]:
@@ -230,12 +262,11 @@ def _dpx_encoding(spec: Any) -> str:
 
 def _rate(spec: Any) -> Fraction | None:
     for name in _RATE_NAMES:
-        value = spec.getattribute(name)
-        if value is None:
-            continue
-        if isinstance(value, tuple):
-            if len(value) == 2 and value[0] > 0 and value[1] > 0:
-                return Fraction(int(value[0]), int(value[1]))
-        elif isinstance(value, int | float) and (rate := as_rate(float(value))):
+        value, rate = spec.getattribute(name), None
+        if isinstance(value, tuple) and len(value) == 2 and value[0] > 0 and value[1] > 0:
+            rate = Fraction(int(value[0]), int(value[1]))
+        elif isinstance(value, int | float):
+            rate = as_rate(float(value))
+        if rate is not None:
             return rate
     return None

@@ -115,9 +115,11 @@ def start_timecode(clip: Clip, rate: Fraction | None = None) -> str | None:
 
 
 def timecode_in(metadata: Iterable[tuple[str, Any, Any]]) -> str:
-    """Return the timecode in a frame's metadata, or ""."""
+    """Return the timecode in a frame's metadata, or "", also for bits that are none."""
     words = (int(value[0]) for name, _, value in metadata if name == TIMECODE)
-    return next(map(decoded, words), "")
+    text = next(map(decoded, words), "")
+    # At 50 frames per second, where all numbers of frames that the bits may hold exist.
+    return "" if frames_of(text, Fraction(50)) is None or text[:2] > "23" else text
 
 
 def decoded(word: int) -> str:
