@@ -107,6 +107,19 @@ def test_edits_without_a_pause_are_saved_all_the_same(
     assert max(np.diff([0.0, *written, clock])) <= SAVE_AT_MOST + SAVE_AFTER
 
 
+def test_what_was_released_is_saved_while_the_next_drag_goes_on(
+    session: Session, sidecar: Path
+) -> None:
+    id_ = vertex(sidecar)
+    session.edit(lambda document: document.set(id_, rgb=(0.5, 0, 0)))
+    session.drag(lambda document: document.set(id_, rgb=(0, 0.5, 0)))
+    session.tick(LATER)
+    assert palette4d.load(sidecar).grade.colour(id_) == (0.5, 0, 0)
+    assert session.dragging
+    assert session.document is not None
+    assert session.document.grade.colour(id_) == (0, 0.5, 0)
+
+
 def test_a_cancelled_drag_leaves_nothing(session: Session, sidecar: Path) -> None:
     before, id_ = sidecar.read_bytes(), vertex(sidecar)
     session.drag(lambda document: document.set(id_, rgb=(0, 0, 1)))

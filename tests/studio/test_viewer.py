@@ -115,6 +115,27 @@ def test_alt_click_is_a_hold_as_the_verb_makes_it(
     assert sidecar.read_bytes() == twin.read_bytes()
 
 
+def test_a_late_picture_of_an_older_drag_is_not_shown(
+    opened: Window, settle: Settle, qtbot: Any
+) -> None:
+    session, viewer, id_ = opened.session, opened.viewer, busiest(opened)
+    waiting: list[Any] = []
+    posts, session.post = session.post, waiting.append
+
+    def pictures() -> list[Any]:
+        return [call for call in waiting if "_arrived" in str(call.__code__.co_names)]
+
+    for number, value in enumerate((0.2, 0.8), 1):
+        session.drag(lambda document, v=value: document.set(id_, rgb=(v, v, v)))
+        qtbot.waitUntil(lambda number=number: len(pictures()) == number, timeout=20_000)
+    session.post = posts
+    for call in reversed(waiting):
+        call()
+    assert viewer.current
+    session.cancel()
+    settle(opened)
+
+
 def test_a_click_before_its_frame_is_read_is_done_when_it_is(
     window: Window, sidecar: Path, qtbot: Any
 ) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QTextDocument
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog, QMessageBox, QTabBar
@@ -87,6 +87,26 @@ def test_a_window_closes_when_its_last_pick_is_followed(
     go_on.set()
     qtbot.waitUntil(lambda: not opened.isVisible())
     assert Document.load(sidecar).grade.colour(id_) == (0.3, 0.2, 0.1)
+
+
+def test_while_a_colour_is_dragged_only_its_own_panels_follow(opened: Window, qtbot: Any) -> None:
+    session, places, wheel = opened.session, opened.timeline.places, opened.inspector.wheel
+    session.select(busiest(opened))
+    told = []
+    session.on("document", lambda: told.append(session.revision), panel=True)
+    shown, drawn = places.revision, opened.inspector.hex.text()
+    QTest.mousePress(wheel, Qt.MouseButton.LeftButton, pos=QPoint(90, 60))
+    for x in (95, 100, 105):
+        QTest.mouseMove(wheel, QPoint(x, 60))
+        qtbot.waitUntil(lambda: opened.viewer.current, timeout=20_000)
+        qtbot.waitUntil(lambda: opened.turns.settled, timeout=20_000)
+    assert session.dragging
+    assert opened.inspector.hex.text() != drawn
+    assert places.revision == shown
+    assert not told
+    QTest.mouseRelease(wheel, Qt.MouseButton.LeftButton, pos=QPoint(105, 60))
+    assert places.revision == session.revision
+    assert told == [session.revision]
 
 
 def test_a_click_in_the_picture_brings_the_inspector(opened: Window, qtbot: Any) -> None:

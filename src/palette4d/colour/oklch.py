@@ -35,6 +35,7 @@ _LAB = np.array(
         [0.02590404246554773, 0.7827717124575297, -0.8086757549230774],
     ]
 )
+_FROM_CONES, _FROM_LAB = np.linalg.inv(_CONES), np.linalg.inv(_LAB)
 #: Halvings of the chroma in the search for the largest that can be displayed.
 HALVINGS = 14
 
@@ -128,7 +129,7 @@ class Lch:
         light, chroma, hue = np.moveaxis(np.asarray(lch, dtype=np.float64), -1, 0)
         angle = np.radians(hue)
         lab = np.stack([light, chroma * np.cos(angle), chroma * np.sin(angle)], axis=-1)
-        linear = (lab @ np.linalg.inv(_LAB).T) ** 3 @ np.linalg.inv(_CONES).T
+        linear = (lab @ _FROM_LAB.T) ** 3 @ _FROM_CONES.T
         if self._back is None:
             return _curve(linear)
         return np.asarray(self._back(linear), dtype=np.float64)

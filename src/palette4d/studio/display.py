@@ -40,6 +40,8 @@ LOW, HIGH = -0.125, 1.25
 OFFSET, HIGHEST = 0.01, 128.0
 #: Views that show display-referred code values as they are, in the built-in configs.
 PLAIN_VIEWS = ("Un-tone-mapped", "Raw")
+#: Pixels from which on two threads take less processor time than they save.
+LEAST_SHARED = 400_000
 #: Painters that are kept: one for each display, view, exposure and gamma.
 KEPT = 16
 
@@ -96,7 +98,7 @@ class Painter:
     def paint(self, colours: F32, *, exact: bool = True, threads: bool = True) -> U8:
         """Return the (h, w, 4) uint8 picture of (h, w, 3) code values; alpha is 255."""
         cpu = self._exact if exact else self._quick
-        if not threads or colours.shape[0] < 64:
+        if not threads or colours.shape[0] * colours.shape[1] < LEAST_SHARED:
             return self._run(cpu, colours)
         result = np.empty((*colours.shape[:2], 4), np.uint8)
         rows = np.linspace(0, len(colours), (os.cpu_count() or 1) + 1).astype(int)

@@ -70,7 +70,7 @@ class Inspector(QWidget):
         self._silent = False
         self._make()
         for event in ("document", "selection", "frame", "view", "clip"):
-            session.on(event, self.refresh, panel=True)
+            session.on(event, self.refresh, panel=True, follows=lambda: True)
         session.on("draft", self._try_again)
         self.refresh()
 
@@ -262,9 +262,10 @@ class Inspector(QWidget):
             self._settled, self._tried = self.target, ()
         self._silent = True
         try:
-            self._show_words(len(session.selection))
+            if not session.dragging:  # they are the same during a drag
+                self._show_words(len(session.selection))
+                self._show_ramp()
             self._show_colour(targets[1:])
-            self._show_ramp()
         finally:
             self._silent = False
 
@@ -341,7 +342,8 @@ class Inspector(QWidget):
         for k, name in enumerate("LCh"):
             range_ = np.repeat(now[None], SAMPLES, axis=0)
             range_[:, k] = np.linspace(*limits[name], SAMPLES)
-            ranges.append(lch.fitted(range_))
+            ranges.append(range_)
+        ranges = [*lch.fitted(np.stack(ranges))]
         both = np.concatenate([target.before, target.after])
         for k, name in enumerate("RGB"):
             limits[name] = min(0.0, float(both.min())), max(1.0, float(both.max()))

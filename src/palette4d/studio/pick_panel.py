@@ -103,7 +103,7 @@ class PickPanel(QWidget):
         for line in (self.takes, self.other, self.part, self.warning):
             column.addWidget(line)
         for event in ("document", "selection", "clip"):
-            session.on(event, self.refresh, panel=True)
+            session.on(event, self.refresh, panel=True, follows=lambda: True)
             session.on(event, lambda: self._resting.start(REST))
         session.on("answer", self._show_answer)
         session.on("view", self.refresh)

@@ -21,9 +21,11 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.common.errors import in_words
 from palette4d.grade.document import Document
+from palette4d.grade.mattes import Display as Curve
 from palette4d.grade.palette import Palette
 from palette4d.studio.display import Display, Look
-from palette4d.studio.player import ByteCache, Region, nearest, resampled
+from palette4d.studio.player import MOST_MOVING, ByteCache, Region, nearest, resampled
+from palette4d.studio.response import Responses
 
 F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]
@@ -49,13 +51,15 @@ class Grade:
     palette: Palette
     conversion: _core.ColourConversion | None
     picks: _core.FramePicks | None = None
+    curve: Curve | None = None  #: from the palette's code values to a display's
 
     @classmethod
     def of(cls, document: Document, frame: float) -> "Grade":
         """Return a document's grade at a time."""
         palette, own = document.grade.palette(frame), document.grade.core.conversion
         picks = document.grade.core.edits.picks_at(palette.frame)
-        return cls(palette, None if own is None else own.steps, picks)
+        curve = document.grade.display() if picks.count else None
+        return cls(palette, None if own is None else own.steps, picks, curve)
 
     @classmethod
     def of_version(cls, document: Document, name: str, frame: float) -> "Grade | None":
@@ -181,6 +185,7 @@ class Preview:
         self._small = ByteCache[tuple[int, int, Region], F32](SMALL_BYTES)
         self._befores = ByteCache[tuple[Any, ...], U8](BEFORE_BYTES)
         self._reel = ByteCache[tuple[Any, ...], Picture](REEL_BYTES)
+        self._responses = Responses()
         self._film: deque[Callable[[], Request | None]] = deque()
         self._wake = threading.Condition()
         self._waiting: Request | None = None
@@ -212,6 +217,7 @@ class Preview:
         self._small.clear()
         self._befores.clear()
         self._reel.clear()
+        self._responses.forget()
 
     def close(self) -> None:
         """End the thread."""
@@ -327,6 +333,8 @@ class Preview:
         """
         recolourer = grade.recolourer()
         premultiplied = premultiplied and pixels.shape[2] == 4
+        # Threads cost small pictures more than they gain: the window's thread works beside them.
+        threads = 1 if pixels.shape[0] * pixels.shape[1] <= MOST_MOVING else 0
         if grade.picks is not None and grade.picks.count:
             check()
             return _core.draw(
@@ -334,7 +342,7 @@ class Preview:
                 "recoloured",
                 recolourer,
                 premultiplied=premultiplied,
-                threads=0,
+                threads=threads,
                 conversion=grade.conversion,
             )
         result = np.empty(pixels.shape, np.float32)
@@ -346,7 +354,7 @@ class Preview:
                 strip,
                 premultiplied=premultiplied,
                 precision="single",
-                threads=0,
+                threads=threads,
                 conversion=grade.conversion,
             )
         return result
@@ -360,7 +368,11 @@ class Preview:
         if exact and not request.region.whole:
             whole = self.exact(request.pixels, grade, request.premultiplied, check)
             return resampled(whole, request.region)
-        return self.exact(self._source(request, exact), grade, request.premultiplied, check)
+        source = self._source(request, exact)
+        dragged = not (exact or request.settled or request.scaled)
+        if dragged and grade.conversion is None and source.shape[2] == 3:
+            return self._responses.picture(source, grade)
+        return self.exact(source, grade, request.premultiplied, check)
 
     def _source(self, request: Request, exact: bool) -> F32:
         """Return the region's pixels at its size, or at its coarse size.

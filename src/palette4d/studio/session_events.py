@@ -12,6 +12,9 @@ from palette4d.studio.states import Status
 #: The advice of the API, and the window's.
 ADVICE = {LEAVE_OUT: texts.BAD_FRAME, OWN_CLIP: texts.OWN_CLIP}
 
+#: Whether a panel is told of each step of a drag; None: it is no panel.
+Follows = Callable[[], bool] | None
+
 Event = Literal[
     "document",  # the palette or its edits, also of every step of a drag
     "clip",  # another clip, or none
@@ -48,7 +51,7 @@ class Events:
 
     def __init__(self) -> None:
         """Begin without listeners."""
-        self._callbacks: dict[str, list[tuple[Callable[[], object], bool]]] = {}
+        self._callbacks: dict[str, list[tuple[Callable[[], object], Follows]]] = {}
         self.status = Status()
         self.post: Callable[[Callable[[], object]], object] = lambda call: call()
         self.later: Callable[[Callable[[], object]], object] = lambda call: call()
@@ -58,21 +61,29 @@ class Events:
         """Whether something is being dragged."""
         return False
 
-    def on(self, event: Event, callback: Callable[[], object], *, panel: bool = False) -> None:
+    def on(
+        self,
+        event: Event,
+        callback: Callable[[], object],
+        *,
+        panel: bool = False,
+        follows: Callable[[], bool] = lambda: False,
+    ) -> None:
         """Call a function after every event of this kind.
 
-        A panel is told later while something is dragged or frames go by: the picture comes first.
+        A panel is told later while frames go by: the picture comes first. While something is
+        dragged, only panels that follow it are told, and the others when it is let go.
         """
-        self._callbacks.setdefault(event, []).append((callback, panel))
+        self._callbacks.setdefault(event, []).append((callback, follows if panel else None))
 
     def emit(self, event: Event) -> None:
         """Tell the views."""
-        moving = event == "frame" or (event == "document" and self.dragging)
-        for callback, panel in tuple(self._callbacks.get(event, ())):
-            if panel and moving:
-                self.later(callback)
-            else:
+        dragged = event == "document" and self.dragging
+        for callback, follows in tuple(self._callbacks.get(event, ())):
+            if follows is None or not (dragged or event == "frame"):
                 callback()
+            elif not dragged or follows():
+                self.later(callback)
 
     def say(self, text: str, level: Literal["info", "warning", "error"] = "info") -> None:
         """Set the status."""

@@ -79,14 +79,16 @@ class SolidView(QWidget):
         self._drag: Drag | None = None
         self._pixels: tuple[object, F64, NDArray[np.uint8]] | None = None
         self._extent: F64 | None = None
+        self._drawn: Palette | None = None  #: at the last change of the document
         self.painter = SolidPainter(self)
         self.menu_actions = view_actions(
             self,
             SOLID_ACTIONS,
             {"next_colour": lambda: self._step(True), "reset_view": self.reset_view},
         )
-        for event in ("document", "clip", "frame", "selection", "hover", "view"):
+        for event in ("clip", "frame", "selection", "hover", "view"):
             session.on(event, self.update, panel=True)
+        session.on("document", self._changed, panel=True, follows=self._moves)
         session.on("pixels", self._pixels_arrived, panel=True)
 
     def sizeHint(self) -> QSize:
@@ -98,6 +100,17 @@ class SolidView(QWidget):
         return QSize(220, 140)
 
     # ---------------------------------------------------------------------------------- content
+
+    def _changed(self) -> None:
+        self._drawn = self.palette_now()
+        self.update()
+
+    def _moves(self) -> bool:
+        """Return whether its colours are others than those that were drawn: picks move none."""
+        now, drawn = self.palette_now(), self._drawn
+        if now is None or drawn is None:
+            return now is not drawn
+        return not np.array_equal(now.edited, drawn.edited)
 
     def _pixels_arrived(self) -> None:
         """Draw the frame's pixels, unless another frame's have arrived."""

@@ -112,7 +112,7 @@ class TimelineView(QWidget):
             ("pixels", self._pixels_arrived),
         )
         for event, call in calls:
-            session.on(event, call, panel=True)
+            session.on(event, call, panel=True, follows=lambda: self._press is not None)
 
     def sizeHint(self) -> QSize:
         """Return the size that shows a common palette whole."""

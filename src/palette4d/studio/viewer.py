@@ -24,7 +24,7 @@ from palette4d.studio.player import Region
 from palette4d.studio.preview import NO_PIXELS, Grade, Picture, Preview, Request
 from palette4d.studio.session import Session
 from palette4d.studio.states import Place
-from palette4d.studio.viewer_paint import SharedImage, ViewerPainter, hatched
+from palette4d.studio.viewer_paint import ViewerPainter, hatched, image_of
 
 #: Pixels of the screen within which the pointer takes the wipe's line, and a press is a click.
 NEAR_WIPE, CLICK = 6, 4
@@ -246,6 +246,9 @@ class Viewer(QWidget):
         session = self.session
         if session.clip is None or session.playing or session.player is None:
             return
+        shown = None if self.picture is None else self.picture.request
+        if shown is not None and shown.revision > picture.request.revision:
+            return  # late, of an older drag
         self._take(picture)
         if picture.exact:
             self._resting.start(REST)
@@ -255,7 +258,7 @@ class Viewer(QWidget):
         for side in ("before", "after"):
             pixels = getattr(picture, side)
             if pixels is not None:
-                self.images[side] = SharedImage(pixels)
+                self.images[side] = image_of(pixels)
             else:
                 self.images.pop(side, None)
         if picture.outside is not None:

@@ -1,0 +1,118 @@
+"""Pictures of a drag from its first ones: what an edit adds to a pixel is linear in what it moves.
+
+A recoloured pixel is p + sum_j a_j(p) d_j, where d_j is the displacement of a palette colour, or
+the change of a pick. The weights a_j stay while the palette and the mattes do; cleaning up is
+linear too. A drag moves few of the d_j. So one picture tells their weights, and the others are
+sums. It knows no toolkit.
+"""
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d import _core
+
+if TYPE_CHECKING:
+    from palette4d.studio.preview import Grade
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+#: So many weights are known from one picture: each channel has those of one colour.
+CHANNELS = 3
+
+
+class Moves:
+    """What a grade moves at a time, and what the weights depend on."""
+
+    def __init__(self, grade: "Grade") -> None:
+        palette, picks = grade.palette, grade.picks
+        self._grade = grade
+        self._picks = [] if picks is None else picks.picks
+        self._left = None if picks is None else picks.left
+        moved = np.asarray(palette.edited) - palette.rgb
+        changes = np.array([change for _, change, _, _ in self._picks]).reshape(-1, 3)
+        #: (n, 3) displacements of the palette's colours, and changes of the picks
+        self.by = np.concatenate([moved, changes])
+
+    def weighs_as(self, other: "Moves") -> bool:
+        """Return whether the weights are those of other moves."""
+        return all(map(np.array_equal, self._fixed(), other._fixed())) and (
+            len(self._picks) == len(other._picks)
+        )
+
+    def _fixed(self) -> list[Any]:
+        """Return what decides the weights."""
+        palette, left = self._grade.palette, self._left
+        fixed = [palette.rgb, palette.faces, np.zeros(0) if left is None else left]
+        for colour, _, strength, matte in self._picks:
+            fixed += [colour, strength, matte]
+        return fixed
+
+    def drawn(self, source: F32, by: F64) -> F32:
+        """Return (h, w, 3) pixels with other displacements and changes."""
+        palette, picks, count = self._grade.palette, None, len(self._grade.palette.rgb)
+        if self._picks:
+            changed = zip(self._picks, by[count:].tolist(), strict=True)
+            own = [(colour, change, part, matte) for (colour, _, part, matte), change in changed]
+            picks = _core.FramePicks(own, left=self._left, display=self._grade.curve)
+        elif self._grade.picks is not None:
+            picks = self._grade.picks  # holds alone
+        moved = np.asarray(palette.rgb) + by[:count]
+        recolourer = _core.Recolourer(palette.rgb, moved, palette.faces, picks=picks)
+        if picks is not None and picks.count:
+            return _core.draw(source, "recoloured", recolourer)
+        return recolourer.apply(source, precision="single")
+
+
+@dataclass
+class Base:
+    """A picture that was drawn, and the weights of colours that have moved since."""
+
+    source: F32
+    moves: Moves
+    picture: F32
+    weights: dict[int, F32] = field(default_factory=dict)
+
+
+class Responses:
+    """Pictures of the grades of a drag, one after another."""
+
+    def __init__(self) -> None:
+        """Know nothing yet."""
+        self._base: Base | None = None
+
+    def forget(self) -> None:
+        """Forget the pictures."""
+        self._base = None
+
+    def picture(self, source: F32, grade: "Grade") -> F32:
+        """Return (h, w, 3) pixels of the palette's space with a grade, within 1e-4 of it."""
+        moves, base = Moves(grade), self._base
+        if base is None or base.source is not source or not moves.weighs_as(base.moves):
+            return self._begin(source, moves)
+        by = (moves.by - base.moves.by).astype(np.float32)
+        rows = np.flatnonzero(by.any(axis=1)).tolist()
+        new = [row for row in rows if row not in base.weights]
+        if len(rows) > CHANNELS:
+            return self._begin(source, moves)
+        if new:
+            unit = base.moves.by.copy()
+            unit[new, np.arange(len(new))] += 1
+            added = base.moves.drawn(source, unit) - base.picture
+            added[~np.isfinite(added)] = 0
+            for channel, row in enumerate(new):
+                base.weights[row] = np.ascontiguousarray(added[..., channel])
+        result = base.picture.copy()
+        part = np.empty_like(result)
+        for row in rows:
+            np.multiply(base.weights[row][..., None], by[row], out=part)
+            result += part
+        return result
+
+    def _begin(self, source: F32, moves: Moves) -> F32:
+        picture = moves.drawn(source, moves.by)
+        self._base = Base(source, moves, picture)
+        return picture
