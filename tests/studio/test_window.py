@@ -245,7 +245,6 @@ def test_panels_follow_the_picture_of_a_drag(opened: Window, settle: Settle, qtb
         assert opened.inspector.boxes["R"].value() != red  # later, when the picture is shown
     qtbot.waitUntil(lambda: opened.turns.settled, timeout=10_000)
     assert opened.inspector.boxes["R"].value() == pytest.approx(0.6)
-    assert opened.timeline.places.revision == opened.session.revision
     picture = opened.viewer.picture
     assert picture is not None
     assert picture.request.revision == opened.session.revision
