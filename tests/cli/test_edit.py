@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from palette4d import _core
+from palette4d import _core, load
 from palette4d.cli import main
 from palette4d.grade import sidecar
 from palette4d.shows import manifest
@@ -544,3 +544,32 @@ def test_more_steps_than_there_are_change_nothing(plain: str) -> None:
     before = Path(plain).read_bytes()
     assert main.main(["edit", plain, "undo", "--steps", "2"]) == 1
     assert Path(plain).read_bytes() == before
+
+
+def test_versions_have_names_and_notes(plain: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(plain, "set v1 --rgb #ff0000") == 0
+    assert run(plain, "version save warm") == 0
+    assert main.main(["edit", plain, "version", "note", "warm", "  for the client, 2nd round "]) == 0
+    assert run(plain, "version rename warm warmer") == 0
+    assert run(plain, "version rename warm warmest") == 1
+    assert run(plain, "set v1 --rgb #0000ff") == 0
+    assert run(plain, "version save cold") == 0
+    assert run(plain, "version rename cold warmer") == 1
+    capsys.readouterr()
+    assert run(plain, "version list") == 0
+    lines = ["* cold", "  warmer: for the client, 2nd round"]
+    assert capsys.readouterr().out.splitlines() == lines
+    fields = json.loads(Path(plain).read_text(encoding="utf-8"))
+    assert [sorted(version) for version in fields["versions"]] == [
+        ["edits", "name"],
+        ["edits", "name", "note"],
+    ]
+    assert run(plain, "version remove warmer") == 0
+    assert run(plain, "undo") == 0
+    assert load(plain).grade.note("warmer") == "for the client, 2nd round"
+    assert main.main(["edit", plain, "version", "note", "warmer", ""]) == 0
+    assert load(plain).grade.note("warmer") == ""
+    assert main.main(["edit", plain, "version", "note", "warmer", "x" * 301]) == 1
+    assert main.main(["edit", plain, "version", "note", "warmer", "two\nlines"]) == 1
+    assert run(plain, "undo --steps 2") == 0  # the note is there again, and then the cold edit
+    assert load(plain).grade.note("warmer") == "for the client, 2nd round"

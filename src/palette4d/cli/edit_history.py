@@ -44,7 +44,7 @@ def add_actions(action: Action) -> None:
 def _add_version(action: Action) -> None:
     version = action(
         "version",
-        "(save NAME | list | use NAME | remove NAME)",
+        "(save NAME | list | use NAME | rename NAME NEW | note NAME TEXT | remove NAME)",
         "keep edits under a name, list the names, or make the edits of a version the active edits. "
         "Active edits that no version holds are kept as a version first. Undo never takes "
         "a version away.",
@@ -53,10 +53,16 @@ def _add_version(action: Action) -> None:
     for name, text in (
         ("save", "keep the active edits under a name"),
         ("use", "make a version's edits the active edits"),
+        ("rename", "give a version another name"),
+        ("note", "say something about a version"),
         ("remove", "remove a version"),
     ):
         parser = what.add_parser(name, help=text)
         parser.add_argument("name", metavar="NAME", help="the version")
+        if name == "rename":
+            parser.add_argument("new", metavar="NEW", help="a name that no version has")
+        elif name == "note":
+            parser.add_argument("text", metavar="TEXT", help="one line; '' removes the note")
         parser.set_defaults(run=run_version)
     parser = what.add_parser("list", help="list the versions; * marks the active edits")
     parser.set_defaults(run=run_version)
@@ -113,13 +119,14 @@ def run_history(args: argparse.Namespace) -> int:
 
 
 def run_version(args: argparse.Namespace) -> int:
-    """Save, list, use or remove a version."""
+    """Save, list, use, rename, describe or remove a version."""
     document = load(args.sidecar)
     if args.what == "list":
         active = set(document.grade.same_edits)
         for name in document.grade.versions:
             mark = "*" if name in active else " "
-            print(f"{mark} {name}")
+            note = document.grade.note(name)
+            print(f"{mark} {name}: {note}" if note else f"{mark} {name}")
         if not document.grade.versions:
             print("no versions")
         return 0
@@ -131,6 +138,12 @@ def run_version(args: argparse.Namespace) -> int:
     elif args.what == "remove":
         document.remove_version(args.name)
         text = f"version {args.name}: removed; `undo` brings it back"
+    elif args.what == "rename":
+        document.rename_version(args.name, args.new)
+        text = f"version {args.name}: its name is {args.new} now"
+    elif args.what == "note":
+        document.set_note(args.name, args.text)
+        text = f"version {args.name}: the note is {'kept' if args.text.strip() else 'removed'}"
     else:
         kept = document.use_version(args.name)
         text = f"version {args.name}: its edits are the active edits"

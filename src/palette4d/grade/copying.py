@@ -132,7 +132,7 @@ def copied(
     match = _match(target, source, time)
     state = dict(_handles(target, _grade(match, _handles_of(source))))
     kept, _ = with_active_kept(target, "before copy")
-    after = kept.with_state({**kept.of_kind("version", "lock"), **state})
+    after = kept.with_state({**kept.of_kind("version", "note", "lock"), **state})
     into = between(source.encoding, target.encoding, _configs(target, source))
     picks = (_pick(match, pick, into) for pick in source.picks)
     after, left_out = taken(after, of_clip, [pick for pick in picks if pick is not None])

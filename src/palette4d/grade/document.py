@@ -435,6 +435,23 @@ class Document:
         """Remove a version; `undo` brings it back."""
         self._take(versions.remove_version(self.grade, name))
 
+    def rename_version(self, name: str, new: str) -> None:
+        """Give a version a name that no version has.
+
+        Raises
+        ------
+        Palette4dError
+            There is no such version, or another one has the new name.
+        """
+        self._take(versions.rename_version(self.grade, name, new))
+
+    def set_note(self, name: str, note: str) -> None:
+        """Say something about a version, in one line of at most 300 characters; "" removes it.
+
+        `grade.note` has it.
+        """
+        self._take(versions.set_note(self.grade, name, note))
+
     def copy_from(
         self,
         source: "Document",

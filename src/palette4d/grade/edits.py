@@ -8,6 +8,7 @@ A state maps keys to values. A key is a kind and an id:
 - ``("pick", id)``: a `Pick`: a pick or a hold.
 - ``("lock", id)``: True for a handle that does not move.
 - ``("version", name)``: the state that the user keeps under a name, without versions.
+- ``("note", name)``: what the user says about a version.
 
 Input and output are plain values: this module knows neither files nor palettes.
 """
@@ -23,12 +24,12 @@ Colour = tuple[float, float, float]
 Ramp = Literal["linear", "smooth", "hold"]
 RAMPS: tuple[Ramp, ...] = get_args(Ramp)
 
-Kind = Literal["handle", "ramp", "pick", "lock", "version"]
+Kind = Literal["handle", "ramp", "pick", "lock", "version", "note"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 Key = tuple[Kind, str]
 State = Mapping[Key, Any]
 
-#: The kinds that recolouring uses; versions wait.
+#: The kinds that recolouring uses; versions wait, and their notes are for people.
 ACTIVE: tuple[Kind, ...] = ("handle", "ramp", "pick", "lock")
 
 #: The key of the clip's ramp.
@@ -172,9 +173,15 @@ class Edit:
         return result
 
     def undoable(self) -> "Edit":
-        """Return the edit without the versions that it makes: no step takes a version away."""
-        kept = tuple(c for c in self.changes if c.kind != "version" or c.after is None)
-        return replace(self, changes=kept)
+        """Return the edit without the versions that it makes: no step takes a version away.
+
+        A version that gets another name is not made.
+        """
+        changes = [c for c in self.changes if c.kind == "version"]
+        stay = (None, *(c.before for c in changes if c.after is None))
+        made = {c.id for c in changes if c.after not in stay}
+        kept = (c for c in self.changes if c.kind not in ("version", "note") or c.id not in made)
+        return replace(self, changes=tuple(kept))
 
 
 def difference(before: State, after: State, label: str = "") -> Edit:
@@ -223,6 +230,8 @@ def merged(
                 renamed["lock", change.id] = renamed[key]
         mine_renamed = change.renamed(renamed)
         _put(result, mine_renamed.key, mine_renamed.after)
+    for key in [key for key in result if key[0] == "note" and ("version", key[1]) not in result]:
+        del result[key]
     places: dict[tuple[str, float], str] = {}
     for (kind, id_), value in result.items():
         place = _place(value) if kind == "handle" else None
@@ -253,6 +262,7 @@ def _place(setting: Setting | None) -> tuple[str, float] | None:
 def _named(key: Key) -> str:
     kind, id_ = key
     names = {"handle": id_, "ramp": "the clip's ramp", "version": f"the version {id_!r}"}
+    names["note"] = f"the note of {names['version']}"
     return names.get(kind, f"the {kind} {id_}")
 
 

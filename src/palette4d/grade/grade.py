@@ -211,9 +211,8 @@ class Grade:
 
     def version(self, name: str) -> Self:
         """Return the grade with the edits of a version as the active edits; "" returns this one."""
-        return (
-            self.with_state({**self.of_version(name), **self.of_kind("version")}) if name else self
-        )
+        kept = self.of_kind("version", "note")
+        return self.with_state({**self.of_version(name), **kept}) if name else self
 
     def of_version(self, name: str) -> State:
         """Return the state of a version."""
@@ -222,6 +221,10 @@ class Grade:
             there = ", ".join(map(repr, self.versions)) or "none"
             raise Palette4dError(f"there is no version {name!r}; the palette has {there}")
         return state
+
+    def note(self, name: str) -> str:
+        """Return what the user says about a version; "" if nothing."""
+        return str(self.state.get(("note", name), ""))
 
     @property
     def same_edits(self) -> tuple[str, ...]:

@@ -35,6 +35,8 @@ def state_of(members: Mapping[str, Any]) -> dict[Key, Any]:
     state = edits_from(members["edits"])
     for version in members.get("versions", ()):
         state["version", version["name"]] = edits_from(version["edits"])
+        if version.get("note"):
+            state["note", version["name"]] = version["note"]
     return state
 
 
@@ -63,7 +65,7 @@ def with_state(
     result["edits"] = edits_fields(state, vertices)
     versions = sorted((name, value) for (kind, name), value in state.items() if kind == "version")
     if versions:
-        result["versions"] = [{"name": n, "edits": edits_fields(v, vertices)} for n, v in versions]
+        result["versions"] = [_version_fields(state, n, v, vertices) for n, v in versions]
     steps = dict(zip(("done", "undone"), history, strict=True))
     kept = {n: v for n, v in members.get("history", {}).items() if n not in steps}
     for name, part in steps.items():
@@ -77,6 +79,12 @@ def with_state(
     if len(used) > 1 or used["grids"]:
         result["mattes"] = used
     return result
+
+
+def _version_fields(state: State, name: str, edits: State, vertices: Iterable[str]) -> Fields:
+    note = state.get(("note", name))
+    told = {} if note is None else {"note": note}
+    return {"name": name, **told, "edits": edits_fields(edits, vertices)}
 
 
 def mattes_of(
@@ -218,6 +226,12 @@ def _true(value: Any) -> bool:
     return True
 
 
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError(f"found {value!r}, expected a text")
+    return value
+
+
 #: How each kind's values are read from JSON.
 _READ: dict[Kind, Callable[[Any], Any]] = {
     "handle": _setting,
@@ -225,12 +239,13 @@ _READ: dict[Kind, Callable[[Any], Any]] = {
     "pick": _pick,
     "lock": _true,
     "version": edits_from,
+    "note": _text,
 }
 
 
 def _step_fields(step: Edit, vertex_ids: Iterable[str]) -> Fields:
     def plain(kind: Kind, value: Any) -> Any:
-        if value is None or kind in ("ramp", "lock"):
+        if value is None or kind in ("ramp", "lock", "note"):
             return value
         if kind == "version":
             return edits_fields(value, vertex_ids)

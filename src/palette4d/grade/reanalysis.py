@@ -14,7 +14,7 @@ from palette4d.grade.grade import Grade
 from palette4d.grade.handle_edits import reset
 from palette4d.grade.members import Fields, history_of
 from palette4d.grade.sidecar import OnEdits, Saved
-from palette4d.grade.versions import save_version
+from palette4d.grade.versions import save_version, set_note
 
 #: `quality.options.method` of a palette that `analyze --like` moved.
 _MOVED = "like"
@@ -69,6 +69,7 @@ def _copied(former: Grade, new: Grade) -> tuple[Grade, list[str]]:
         if (version := former.version(name)).edited:
             new, _ = copied(new, version, of_clip)
             new, _ = save_version(new, name)
+            new = set_note(new, name, former.note(name))
             new = reset(new)
     if former.edited:
         new, fit = copied(new, former, of_clip)

@@ -5,34 +5,73 @@ edits which were in the way have now.
 """
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from palette4d.common.errors import Palette4dError
+from palette4d.grade.edits import Key
 from palette4d.grade.grade import Grade
 
 #: The most characters of a version's name.
 LONGEST_NAME = 100
+#: The most characters of a note.
+LONGEST_NOTE = 300
 
 
 def save_version(grade: Grade, name: str) -> tuple[Grade, str | None]:
     """Keep the active edits as a version; another version of this name becomes "former NAME"."""
-    if not 1 <= len(name.strip()) <= LONGEST_NAME or not name.isprintable():
-        raise Palette4dError(
-            f"found the version name {name!r}, expected 1 to {LONGEST_NAME} printable characters"
-        )
+    _check_name(name)
     former, kept = grade.state.get(("version", name)), None
     after = grade.put("version", name, grade.active)
     if former is not None and former != grade.active:
         kept = free_name(grade, f"former {name}")
         after = after.put("version", kept, former)
+        after = after.having({("note", kept): note_of(grade, name), ("note", name): None})
     return after, kept
+
+
+def _check_name(name: str) -> None:
+    if not 1 <= len(name.strip()) <= LONGEST_NAME or not name.isprintable():
+        raise Palette4dError(
+            f"found the version name {name!r}, expected 1 to {LONGEST_NAME} printable characters"
+        )
+
+
+def note_of(grade: Grade, name: str) -> str | None:
+    """Return the note of a version, None without one."""
+    return grade.note(name) or None
+
+
+def rename_version(grade: Grade, name: str, new: str) -> Grade:
+    """Give a version another name, that no version has; its note stays with it."""
+    _check_name(new)
+    edits = grade.of_version(name)
+    if new in grade.versions and new != name:
+        raise Palette4dError(
+            f"found a version {new!r} already, expected a name that no version has; "
+            f"remove or rename that one first"
+        )
+    there: Mapping[Key, Any] = {("version", new): edits, ("note", new): note_of(grade, name)}
+    return grade.having({**_nothing_of(name), **there}, f"rename version {name} to {new}")
+
+
+def set_note(grade: Grade, name: str, note: str) -> Grade:
+    """Say something about a version; "" takes it away."""
+    grade.of_version(name)
+    note = note.strip()
+    if len(note) > LONGEST_NOTE or not note.isprintable():
+        raise Palette4dError(
+            f"found a note of {len(note)} characters, expected at most {LONGEST_NOTE}, printable "
+            "and on one line"
+        )
+    return grade.put("note", name, note or None, f"note of version {name}")
 
 
 def use_version(grade: Grade, name: str) -> tuple[Grade, str | None]:
     """Make the edits of a version the active ones; others are kept as version "before NAME"."""
     wanted = grade.of_version(name)
     grade, kept = with_active_kept(grade, f"before {name}")
-    state = {**wanted, **grade.of_kind("version")}
+    state = {**wanted, **grade.of_kind("version", "note")}
     return grade.with_state(state, f"use version {name}"), kept
 
 
@@ -47,7 +86,11 @@ def with_active_kept(grade: Grade, name: str) -> tuple[Grade, str | None]:
 def remove_version(grade: Grade, name: str) -> Grade:
     """Remove a version."""
     grade.of_version(name)
-    return grade.put("version", name, None, f"remove version {name}")
+    return grade.having(_nothing_of(name), f"remove version {name}")
+
+
+def _nothing_of(name: str) -> dict[Key, None]:
+    return {("version", name): None, ("note", name): None}
 
 
 def free_name(grade: Grade, name: str) -> str:
