@@ -92,6 +92,15 @@ def draw_picks(folder: Path) -> None:
     edit(sidecar, "area", "p1", *at, "--pixel", "60,330", "--box", "15")
     edit(sidecar, "hold", *at, "--pixel", "738,282", "--box", "5")
     draw("studio_picks", sidecar, 53, picks)
+    for words in (("save", "autumn"), ("note", "autumn", "for the client: less red in the grass")):
+        edit(sidecar, "version", *words)
+    edit(sidecar, "disable", "p1")
+    edit(sidecar, "version", "save", "summer")
+    edit(sidecar, "enable", "p1")
+    edit(sidecar, "change", "p1", "--to", "#7c6a2a")
+    edit(sidecar, "version", "save", "early autumn")
+    draw("studio_versions", sidecar, 53, versions)
+    edit(sidecar, "change", "p1", "--to", "#b5541c")
     draw("studio_scopes", sidecar, 53, scopes, part="scopes")
 
 
@@ -135,6 +144,14 @@ def scopes(window: Any) -> None:
     for button in window.scopes.buttons.values():
         if not button.isChecked():
             button.click()
+
+
+def versions(window: Any) -> None:
+    """Wipe between two versions."""
+    window.show_or_hide("versions")
+    for k in range(2):
+        window.gallery.list.item(k).setSelected(True)
+    window.gallery.compare()
 
 
 def picks(window: Any) -> None:

@@ -549,7 +549,9 @@ def test_more_steps_than_there_are_change_nothing(plain: str) -> None:
 def test_versions_have_names_and_notes(plain: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(plain, "set v1 --rgb #ff0000") == 0
     assert run(plain, "version save warm") == 0
-    assert main.main(["edit", plain, "version", "note", "warm", "  for the client, 2nd round "]) == 0
+    assert (
+        main.main(["edit", plain, "version", "note", "warm", "  for the client, 2nd round "]) == 0
+    )
     assert run(plain, "version rename warm warmer") == 0
     assert run(plain, "version rename warm warmest") == 1
     assert run(plain, "set v1 --rgb #0000ff") == 0

@@ -358,6 +358,25 @@ def rows(hand: Hand) -> Iterator[Row]:
     yield "keep a version", key(Qt.Key.Key_V), lambda: ["version", "save", "A"]
     yield "reset everything", lambda: window._do("reset_all"), lambda: ["reset"]
     yield "use a version", key(Qt.Key.Key_1), lambda: ["version", "use", "A"]
+    gallery = window.gallery
+
+    def note() -> None:
+        gallery.list.item(0).setSelected(True)
+        gallery.note.setText("for the client")
+        gallery.note.setModified(True)
+        gallery.note.editingFinished.emit()
+
+    yield "a version's note", note, lambda: ["version", "note", "A", "for the client"]
+    yield (
+        "a version's name",
+        lambda: gallery.list.item(0).setText("warm"),
+        lambda: ["version", "rename", "A", "warm"],
+    )
+    yield (
+        "remove a version",
+        lambda: (gallery.list.item(0).setSelected(True), gallery.buttons["delete"].click()),
+        lambda: ["version", "remove", "warm"],
+    )
 
 
 def _right(timeline: Any, frames: float = 2) -> QPointF:

@@ -203,6 +203,33 @@ def use_version(session: Session, name: str) -> None:
     session.edit(lambda document: document.use_version(name), text)
 
 
+def rename_version(session: Session, name: str, new: str) -> None:
+    """Give a version another name (`version rename`); what shows it goes on with that name."""
+    shown = {part: new for part in ("version", "after") if getattr(session.view, part) == name}
+    session.edit(
+        lambda document: document.rename_version(name, new),
+        texts.RENAMED_VERSION.format(name=name, new=new),
+    )
+    if new in session.versions:
+        session.look(**shown)
+
+
+def note_version(session: Session, name: str, note: str) -> None:
+    """Say something about a version (`version note`)."""
+    session.edit(lambda document: document.set_note(name, note), texts.NOTED.format(name=name))
+
+
+def remove_versions(session: Session, names: list[str]) -> None:
+    """Remove versions (`version remove`), as one step."""
+
+    def change(document: Document, _: OfClip | None) -> None:
+        for name in names:
+            document.remove_version(name)
+
+    text = texts.REMOVED_VERSION.format(names=", ".join(names))
+    _as_one(session, "remove versions", names, change, text, alone=len(names) == 1)
+
+
 def source_of(session: Session) -> str | None:
     """Return the clip that edits read."""
     return None if session.clip is None else session.clip.source

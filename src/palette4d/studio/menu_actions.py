@@ -47,6 +47,9 @@ class MenuActions:
             "pick_pixel": lambda: self._at_pointer(viewer.on_pick),
             "hold_pixel": lambda: self._at_pointer(viewer.on_hold),
             "save_version": lambda: grade_steps.keep_version(session),
+            "switch": lambda: session.look(
+                compare="after" if session.view.compare == "before" else "before"
+            ),
             "show_after": lambda: session.look(compare="after"),
             "show_before": lambda: session.look(compare="before"),
             "show_wipe": lambda: session.look(compare="wipe"),
@@ -136,7 +139,7 @@ class MenuActions:
         at = names.index(now) if now in names else 0
         name = names[(at + 1) % len(names)]
         compare = self.session.view.compare
-        self.session.look(version=name, compare=compare if compare != "after" else "wipe")
+        self.session.look(version=name, after="", compare=compare if compare != "after" else "wipe")
         if len(names) == 1:
             text = texts.NO_OTHER_VERSION if self.session.versions else texts.NO_VERSIONS
             self.session.say(text, "warning")

@@ -81,6 +81,7 @@ ACTIONS = (
     Action("ramp_hold", PALETTE, (), group=2),
     Action("save_version", PALETTE, ("V",), group=3),
     Action("compare_version", PALETTE, ("Shift+V",), group=3),
+    Action("switch", PALETTE, ("B",), group=3),
     Action("show_after", VIEW, ("F1",), True),
     Action("show_before", VIEW, ("F2",), True),
     Action("show_wipe", VIEW, ("F3", "W"), True),

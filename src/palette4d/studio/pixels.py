@@ -58,7 +58,7 @@ def probe_at(session: Session, x: int, y: int) -> Probe | None:
     source = tuple(float(v) for v in pixel[0, 0])
     if session.document is None:
         return Probe(x, y, source, source)
-    grade = Grade.of(session.document, session.frame)
+    grade = Grade.shown(session.document, session.view.after, session.frame)
     around, row, column = _around(pixels, x, y)
     result = Preview.exact(around, grade, session.clip.premultiplied)[row, column]
     colour: Any = _core.straight_colours(pixel, premultiplied=session.clip.premultiplied)[0]

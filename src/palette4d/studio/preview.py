@@ -66,6 +66,11 @@ class Grade:
         """Return the grade of a version at a time; None if there is no such version."""
         return cls.of(document.version(name), frame) if name in document.grade.versions else None
 
+    @classmethod
+    def shown(cls, document: Document, version: str, frame: float) -> "Grade":
+        """Return the grade that "after" shows: that of a version, or the document's ("")."""
+        return cls.of_version(document, version, frame) or cls.of(document, frame)
+
     def recolourer(self) -> _core.Recolourer:
         """Return the exact recolouring."""
         palette = self.palette

@@ -14,6 +14,7 @@ from palette4d import _core
 from palette4d.studio.display import Display, Look
 
 if TYPE_CHECKING:
+    from palette4d.grade.document import Document
     from palette4d.studio.session import Session
 
 F32 = NDArray[np.float32]
@@ -29,12 +30,15 @@ def on_screen(session: "Session", rgb: ArrayLike) -> U8:
     return _painted(session.display, session.looked, colours.astype(np.float32))
 
 
-def thumbnail(session: "Session", frame: float, premultiplied: bool) -> Callable[[F32], U8]:
+def thumbnail(
+    session: "Session", frame: float, premultiplied: bool, version: "Document | None" = None
+) -> Callable[[F32], U8]:
     """Return a function that may run in a thread: a frame's pixels to 8 bits, with the edits.
 
-    It takes (h, w, 3 or 4) code values and returns (h, w, 3), over black.
+    It takes (h, w, 3 or 4) code values and returns (h, w, 3), over black. The edits are those of
+    `version`, if there is one.
     """
-    document, display, look = session.document, session.display, session.looked
+    document, display, look = version or session.document, session.display, session.looked
 
     def picture(pixels: F32) -> U8:
         if document is not None:

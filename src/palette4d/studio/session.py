@@ -202,7 +202,7 @@ class Session(Drafts):
         self.clip = self.player = self._stamp = self.probe = self.hover = self.place = None
         self.selection, self.playing, self.marks = (), 0, None
         self.tool, self.answer = "", None
-        self._edited_at, self.view = None, dataclasses.replace(self.view, version="")
+        self._edited_at, self.view = None, dataclasses.replace(self.view, version="", after="")
 
     # -------------------------------------------------------------------------------------- edits
 

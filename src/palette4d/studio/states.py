@@ -32,6 +32,8 @@ class View:
         Show the matte of the selected pick.
     version : str
         The version that "before" shows instead of the source; "" is the source.
+    after : str
+        The version that "after" shows instead of the grade; "" is the grade.
     """
 
     compare: Literal["after", "before", "wipe", "side"] = "after"
@@ -43,6 +45,7 @@ class View:
     outside: bool = False
     matte: bool = False
     version: str = ""
+    after: str = ""
 
 
 @dataclass(frozen=True)

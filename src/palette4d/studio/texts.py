@@ -139,6 +139,7 @@ ACTIONS = {
         "ramp_hold": "Ramp: hold",
         "save_version": "Keep as a version",
         "compare_version": "Compare with a version",
+        "switch": "A/B: switch between before and after",
         "show_after": "After",
         "show_before": "Before",
         "show_wipe": "Wipe",
@@ -259,6 +260,21 @@ POINT_AT = "point at a pixel first"
 KEPT_VERSION = "kept as version {name}"
 USES_VERSION = "version {name}"
 NO_VERSION = "there is no version {number}; V keeps one"
+RENAMED_VERSION = "version {name} is {new} now"
+NOTED = "the note of version {name} is kept"
+REMOVED_VERSION = "removed version {names}; undo brings it back"
+NO_VERSIONS_LONG = "No versions yet.\nKeep the grade as a version, and compare it with others here."
+NOTE_HINT = "Note of the selected version"
+GALLERY_USED = "The grade is this version."
+GALLERY_BUTTONS = {
+    "keep": ("Keep", "Keep the grade as a version (V)"),
+    "use": ("Use", "Make it the grade (double-click, Enter)"),
+    "compare": ("Wipe", "Wipe between it and the grade; of two versions: between these"),
+    "rename": ("Rename", "Give it another name (F2)"),
+    "delete": ("Delete", "Remove the selected versions (Del); undo brings them back"),
+}
+THE_GRADE = "the grade"
+COMPARES = "before shows {}, after shows {}"
 NO_VERSIONS = "no versions yet: V keeps one"
 NO_OTHER_VERSION = "no version differs from this grade; before shows the source"
 COMPARED = "before shows version {name}"

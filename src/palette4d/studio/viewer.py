@@ -196,8 +196,10 @@ class Viewer(QWidget):
         return self._clips, frame, self.region(), session.looked, sides, before, session.revision
 
     def _before_key(self) -> str:
-        version = self.session.view.version
-        return f"{version} {self.session.revision}" if version else ""
+        view = self.session.view
+        if not view.version and not view.after:
+            return ""
+        return f"{view.version}\n{view.after}\n{self.session.revision}"
 
     def with_pixels(self, request: Request) -> Request | None:
         """Return a request to play with its pixels; None if they are gone."""
@@ -211,7 +213,7 @@ class Viewer(QWidget):
         document = session.document
         assert session.clip is not None
         assert session.display is not None
-        grade = None if document is None else Grade.of(document, frame)
+        grade = None if document is None else Grade.shown(document, view.after, frame)
         before = None
         if view.version and document is not None:
             before = Grade.of_version(document, view.version, frame)

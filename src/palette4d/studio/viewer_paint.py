@@ -124,16 +124,18 @@ class ViewerPainter:
 
     def _draw_captions(self, painter: QPainter) -> None:
         view = self.session.view
-        before = view.version or texts.BEFORE
+        before, after = view.version or texts.BEFORE, view.after or texts.AFTER
         captions: list[tuple[str, QRectF, Qt.AlignmentFlag]] = []
         left, right = Qt.AlignmentFlag.AlignLeft, Qt.AlignmentFlag.AlignRight
         panes = self.viewer.panes()
         if self.viewer.comparing or view.compare == "before":
             captions = [(before, panes[0][1], left)]
         elif view.compare == "side":
-            captions = [(before, panes[0][1], left), (texts.AFTER, panes[1][1], left)]
+            captions = [(before, panes[0][1], left), (after, panes[1][1], left)]
         elif view.compare == "wipe":
-            captions = [(before, panes[0][1], left), (texts.AFTER, panes[0][1], right)]
+            captions = [(before, panes[0][1], left), (after, panes[0][1], right)]
+        elif view.after:
+            captions = [(after, panes[0][1], left)]
         for text, pane, side in captions:
             _label(painter, text, self._target(pane) & pane, side)
 

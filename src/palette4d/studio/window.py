@@ -55,6 +55,7 @@ from palette4d.studio.solid_view import SolidView
 from palette4d.studio.timeline_view import TimelineView
 from palette4d.studio.transport import Playback, Transport
 from palette4d.studio.verb_menu import VerbMenu
+from palette4d.studio.versions_gallery import Gallery
 from palette4d.studio.viewer import Viewer
 
 #: Milliseconds between two looks at the file.
@@ -177,6 +178,7 @@ class Window(QMainWindow):
         self.viewer.on_pick, self.viewer.on_hold = self.inspector.pick, self.inspector.hold
         self.viewer.on_area = self.inspector.add_area
         self.history = History(session)
+        self.gallery = Gallery(session)
         self.files = FileMenu(self)
         self.shots = Shots(session, self.files.open_shot)
         middle = QWidget()
@@ -221,10 +223,15 @@ class Window(QMainWindow):
             "scopes": self._dock(texts.SCOPES_PANEL, self.scopes, area.RightDockWidgetArea),
             "inspector": self._dock(texts.INSPECTOR, self.inspector, area.RightDockWidgetArea),
             "history": self._dock(texts.HISTORY, self.history, area.RightDockWidgetArea),
+            "versions": self._dock(texts.VERSIONS, self.gallery, area.RightDockWidgetArea),
             "timeline": self._dock(texts.TIMELINE, self.timeline, area.BottomDockWidgetArea),
             "shots": self._dock(texts.SHOTS, self.shots, area.LeftDockWidgetArea),
         }
         self.tabifyDockWidget(self.docks["inspector"], self.docks["history"])
+        self.tabifyDockWidget(self.docks["history"], self.docks["versions"])
+        self.docks["versions"].visibilityChanged.connect(
+            lambda _: self.turns.later(self.gallery.refresh)
+        )
         self.docks["inspector"].raise_()
         self.tabifyDockWidget(self.docks["solid"], self.docks["scopes"])
         self.docks["solid"].raise_()
@@ -539,6 +546,7 @@ class Window(QMainWindow):
             and self.inspector.panel.settled
             and self.turns.settled
             and self.scopes.settled
+            and self.gallery.settled
             and (self.timeline.settled or not self.timeline.isVisible())
         )
 
