@@ -352,7 +352,7 @@ def test_a_frame_that_does_not_decode_is_a_message(
     window.session.player._frames.clear()
     window.session.go(5)
     qtbot.waitUntil(lambda: "0005" in window.viewer.problem, timeout=20_000)
-    assert "Load the file again" in window.viewer.problem
+    assert "read by itself" in window.viewer.problem
     window.viewer.repaint()
     window.session.go(7)
     settle(window)

@@ -119,9 +119,10 @@ class ImageClip(Clip):
         return header, samples, spec.get_int_attribute("Orientation", 1)
 
     def _path(self, frame: int) -> Path:
-        if frame not in self.sequence.files:
+        path = self.sequence.path(frame)
+        if frame not in self.sequence.files and not path.is_file():  # it may have come since
             raise _missing(self.sequence, [frame])
-        return self.sequence.path(frame)
+        return path
 
     def _check(self, header: Header, frame: int) -> None:
         """Raise an error if a frame's size or channels differ from the first frame's."""

@@ -131,6 +131,8 @@ def run(
         window.restore()
     window.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen, hidden)
     window.show()  # first: a dialog stands above it
+    if not hidden:
+        window.files.offer_crashed()
     if path is not None:
         window.open_path(path, clip)
     if frame is not None:

@@ -11,6 +11,7 @@ from palette4d.common.errors import Palette4dError
 from palette4d.shows import manifest
 from palette4d.shows.timeline_files import is_timeline
 from palette4d.studio import texts
+from palette4d.studio.instance import is_open
 from palette4d.studio.paths import sequence_of, sidecar_of
 from palette4d.studio.session import recovered
 
@@ -26,6 +27,7 @@ class FileMenu:
 
     def __init__(self, window: "Window") -> None:
         self.window, self.session = window, window.session
+        self._marked = ""  # the sidecar that the settings have as open
 
     def open_path(self, path: str, clip: str | None = None) -> None:
         """Open a sidecar or a manifest; a clip without a palette, or an edit, is analysed."""
@@ -66,6 +68,32 @@ class FileMenu:
         copy = recovered(path)
         if copy is not None:
             self.session.say(texts.RECOVERY.format(copy=copy), "warning")
+            opens = {texts.OPEN_COPY: lambda: self.open_path(str(copy))}
+            self.window.banner.tell("recovery", self.session.status.text, "warning", opens)
+
+    def mark_open(self, path: Path | None) -> None:
+        """Keep which sidecar is open, until it is closed: after a crash it is offered again."""
+        wanted = "" if path is None else str(path.absolute())
+        if wanted != self._marked:
+            others = [each for each in self._listed("open") if each != self._marked]
+            self.window.settings.setValue("open", [wanted, *others] if wanted else others)
+            self.window.settings.sync()
+            self._marked = wanted
+
+    def offer_crashed(self) -> None:
+        """Offer to open again what was open in a window that ended without closing."""
+        marked = [each for each in self._listed("open") if each != self._marked]
+        alive = [each for each in marked if is_open(each)]
+        self.window.settings.setValue("open", [*alive, *([self._marked] if self._marked else [])])
+        lost = next((each for each in marked if each not in alive and Path(each).is_file()), None)
+        if lost is not None:
+            text = texts.CRASHED.format(name=Path(lost).name)
+            reopens = {texts.REOPEN: lambda: self.open_path(lost)}
+            self.window.banner.tell("crash", text, "warning", reopens)
+
+    def _listed(self, name: str) -> list[str]:
+        found: Any = self.window.settings.value(name, [])
+        return [found] if isinstance(found, str) else [str(each) for each in found or []]
 
     def open_shot(self, path: Path) -> None:
         """Open a shot of the list."""
@@ -82,8 +110,7 @@ class FileMenu:
 
     def recent_files(self) -> list[str]:
         """Return the recent files, the newest first."""
-        found: Any = self.window.settings.value("recent", [])
-        return [found] if isinstance(found, str) else [str(each) for each in found or []]
+        return self._listed("recent")
 
     def fill_recent(self) -> None:
         """Fill the menu of the recent files."""

@@ -41,6 +41,13 @@ def bring_forward(sidecar: str | os.PathLike[str], frame: float | None) -> bool:
     return heard
 
 
+def is_open(sidecar: str | os.PathLike[str]) -> bool:
+    """Whether a window has this sidecar open."""
+    socket = QLocalSocket()
+    socket.connectToServer(name_of(sidecar))
+    return socket.waitForConnected(100)
+
+
 def _ours(socket: str) -> bool:
     """Whether a socket is this user's: in the folder of temporary files, anyone can make one."""
     if not hasattr(os, "getuid"):

@@ -139,6 +139,7 @@ class Player:
         self.clip = clip
         self.numbers = frozenset(clip.frames)
         self.errors: dict[int, str] = {}
+        self._again: set[int] = set()  # frames with an error that are to be tried again
         self._frames = ByteCache[int, F32](limit)
         self._small = ByteCache[tuple[int, Region], F16](small_limit)
         self._ready = ready
@@ -184,8 +185,10 @@ class Player:
                 self._wake.notify()
 
     def _have(self, number: int, region: Region | None) -> bool:
-        if number in self.errors or (number, region) in self._reading:
+        if (number, region) in self._reading:
             return True
+        if number in self.errors:
+            return number not in self._again
         return number in self._frames if region is None else (number, region) in self._small
 
     def read(self, number: int) -> F32:
@@ -214,6 +217,13 @@ class Player:
         with self._wake:
             return not self._wanted and not self._reading
 
+    def try_again(self, number: int) -> None:
+        """Read a frame again that could not be read; until it is read, its error stays."""
+        with self._wake:
+            self._again.add(number)
+            self._wanted.insert(0, (number, None))
+            self._wake.notify()
+
     def forget_errors(self) -> None:
         """Try frames again that could not be read."""
         self.errors.clear()
@@ -234,9 +244,11 @@ class Player:
                 number, region = (self._wanted or self._later).pop(0)
                 if self._have(number, region):
                     continue
+                self._again.discard(number)
                 self._reading.add((number, region))
             try:
                 self._take(number, region)
+                self.errors.pop(number, None)
             except Exception as error:  # a decoder may fail in any way: the window stays
                 self.errors[number] = words_of(error)
             finally:

@@ -109,7 +109,7 @@ class Session(Drafts):
             source = document.grade.core.clip["source"] or document.grade.core.clip["name"]
             self.say(texts.CLIP_MISSING.format(source=source), "warning")
         else:
-            self.say(self._fit() or texts.OPENED.format(name=Path(path).name))
+            self.say(self.fit() or texts.OPENED.format(name=Path(path).name))
 
     def open_clip(self, spec: str, *, frames: str | None = None) -> None:
         """Open a clip without a palette.
@@ -125,14 +125,15 @@ class Session(Drafts):
         self._set_clip(found)
         self._changed()
         self.emit("frame")
+        self.say(texts.OPENED.format(name=found.name))
 
     def find_clip(self, spec: str) -> None:
         """Use another clip with the document, where the stored path leads nowhere."""
         self._set_clip(open_clip(spec, skip_bad_frames=True))
         self.emit("frame")
-        self.say(self._fit() or texts.OPENED.format(name=Path(spec).name))
+        self.say(self.fit() or texts.OPENED.format(name=Path(spec).name))
 
-    def _fit(self) -> str:
+    def fit(self) -> str:
         """Return what is odd about the clip for this document: its size, or frames that it lacks.
 
         Frames of the clip that the document does not have are not shown.

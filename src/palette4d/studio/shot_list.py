@@ -109,9 +109,7 @@ class Shots(QWidget):
 
     def _set(self, generation: int, row: int, pixels: U8) -> None:
         if generation == self._generation:
-            height, width = pixels.shape[:2]
-            image = QImage(pixels.data, width, height, 4 * width, QImage.Format.Format_RGBX8888)
-            self.list.item(row).setIcon(QIcon(QPixmap.fromImage(image)))
+            self.list.item(row).setIcon(icon_of(pixels))
 
     def _chosen(self, row: int) -> None:
         if 0 <= row < len(self.entries) and self.entries[row].status == manifest.DONE:
@@ -140,6 +138,13 @@ class Shots(QWidget):
                 self._chosen(row)
                 return
             row += way
+
+
+def icon_of(pixels: U8) -> QIcon:
+    """Return pixels, (h, w, 4) uint8, as an icon."""
+    height, width = pixels.shape[:2]
+    image = QImage(pixels.data, width, height, 4 * width, QImage.Format.Format_RGBX8888)
+    return QIcon(QPixmap.fromImage(image))
 
 
 def thumbnail(sidecar: Path) -> U8 | None:

@@ -3,13 +3,15 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+Level = Literal["info", "warning", "error"]
+
 
 @dataclass(frozen=True)
 class Status:
     """What the last action did, or what is wrong."""
 
     text: str = ""
-    level: Literal["info", "warning", "error"] = "info"
+    level: Level = "info"
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from palette4d.common.errors import Palette4dError
 from palette4d.shows.manifest import ENDING
 from palette4d.studio import texts
 from palette4d.studio.former import Former
-from palette4d.studio.paths import beside, place_for
+from palette4d.studio.paths import OWN_FOLDER, beside, place_for
 from palette4d.studio.verb_dialog import Field, VerbDialog
 
 if TYPE_CHECKING:
@@ -100,6 +100,31 @@ class VerbMenu:
             stem = _core.clip_name(path.name) or path.absolute().parent.name
             out = str(place_for(path.with_name(f"{stem}.p4d.json")))
         return self._analyze(texts.ANALYZE, source, out)
+
+    def try_sample(self) -> None:
+        """Open the sample clip with its palette; the first time they are made, with progress."""
+        folder = Path.home() / OWN_FOLDER / "sample"
+        clip, sidecar = folder / "sample.####.png", folder / "sample.p4d.json"
+        if sidecar.is_file():
+            self.window.open_path(str(sidecar))
+            return
+
+        def analyze(dialog: VerbDialog) -> None:
+            dialog.close()
+            self.window.open_path(str(clip))
+            self.dialogs[-1].start()
+
+        fields = [
+            Field("-o", texts.CLIP, "save", str(clip)),
+            Field("--force", kind="check", value="yes"),
+        ]
+        self._verb(texts.TRY_SAMPLE, "sample-clip", fields, analyze).start()
+
+    def choose_space(self) -> VerbDialog:
+        """Ask for the clip's colour space, and find the palette in it."""
+        dialog = self.analyze() if self.session.document is None else self.analyze_again()
+        dialog.go_to("--input-space")
+        return dialog
 
     def analyze_show(self, path: str) -> VerbDialog:
         """Find the palettes of the shots of an edit (.otio, .edl)."""
@@ -196,7 +221,7 @@ class VerbMenu:
             self.session.go(frame)
             self.former.written(out)
         if notes:
-            self.session.say(notes, "warning")
+            self.window.banner.tell("notes", notes, "warning", {})
         dialog.close()
 
     def render(self) -> VerbDialog:

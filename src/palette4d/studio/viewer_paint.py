@@ -47,10 +47,11 @@ class ViewerPainter:
         painter = QPainter(self.viewer)
         painter.fillRect(self.viewer.rect(), QColor(theme.PIT))
         if self.session.clip is None:
-            self._say(painter, texts.EMPTY if self.session.document is None else texts.NO_CLIP)
+            if self.session.document is not None:
+                self._say(painter, texts.NO_PICTURE)
             return
-        if self.viewer.problem:
-            self._say(painter, self.viewer.problem, QColor(theme.ERROR))
+        if self.viewer.problem:  # the banner says why
+            self._say(painter, texts.BAD_PICTURE.format(frame=self.session.frame))
             return
         if self.viewer.picture is None:
             self._say(painter, texts.READING)

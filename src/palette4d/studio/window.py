@@ -40,6 +40,7 @@ from PySide6.QtWidgets import (
 
 from palette4d.common.errors import Palette4dError
 from palette4d.studio import menu_entries, texts, theme
+from palette4d.studio.banner import Banner
 from palette4d.studio.file_menu import FileMenu
 from palette4d.studio.help_menu import HelpMenu
 from palette4d.studio.history_list import History
@@ -52,6 +53,7 @@ from palette4d.studio.scopes_view import Scopes
 from palette4d.studio.session import Session
 from palette4d.studio.shot_list import Shots
 from palette4d.studio.solid_view import SolidView
+from palette4d.studio.start_page import StartPage
 from palette4d.studio.timeline_view import TimelineView
 from palette4d.studio.transport import Playback, Transport
 from palette4d.studio.verb_menu import VerbMenu
@@ -192,6 +194,15 @@ class Window(QMainWindow):
         self._make_fields()
         self._make_status()
         self.commands, self.verbs, self.help = MenuActions(self), VerbMenu(self), HelpMenu(self)
+        files, verbs = self.files, self.verbs
+        self.banner = Banner(
+            session, self.viewer, files.find_clip, files.save_as, verbs.choose_space
+        )
+        column.insertWidget(0, self.banner)
+        self.start = StartPage(
+            session, files.open, verbs.try_sample, self.open_path, files.recent_files
+        )
+        QVBoxLayout(self.viewer).addWidget(self.start)
         self.actions_by_name: dict[str, QAction] = {}
         self._make_menus()
         for name in ("first_frame", "previous_frame", "play", "next_frame", "last_frame"):
@@ -207,6 +218,7 @@ class Window(QMainWindow):
         session.on("followed", self._close_if_followed)
         self._listener = Listener(self, self._asked_for)
         session.on("document", lambda: self._listener.listen(session.path))
+        session.on("document", lambda: self.files.mark_open(session.path))
         self._timer = QTimer(self)
         self._timer.timeout.connect(session.tick)
         self._timer.start(TICK)
@@ -514,6 +526,7 @@ class Window(QMainWindow):
             if not self.session.saved and asks.clickedButton() != discard:
                 event.ignore()
                 return
+        self.files.mark_open(None)
         self.settings.setValue("geometry", self.saveGeometry())
         self.settings.setValue("state", self.saveState())
         self.shut()

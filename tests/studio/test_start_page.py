@@ -1,0 +1,50 @@
+"""The first page: open, try the sample, and recent files with pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QSize
+from PySide6.QtWidgets import QPushButton
+
+from palette4d.studio import texts
+from palette4d.studio.window import Window
+
+
+def test_recent_files_have_pictures_and_open(
+    window: Window, sidecar: Path, qtbot: Any, tmp_path: Path
+) -> None:
+    gone = tmp_path / "gone.p4d.json"
+    window.settings.setValue("recent", [str(gone), str(sidecar)])
+    page = window.start
+    page.fill()
+    assert page.isVisible()
+    (item,) = (page.list.item(row) for row in range(page.list.count()))
+    assert item.text() == sidecar.name
+
+    def coloured() -> bool:
+        image = item.icon().pixmap(QSize(112, 63)).toImage()
+        return image.pixelColor(image.width() // 2, image.height() // 3).lightness() > 20
+
+    qtbot.waitUntil(coloured, timeout=20_000)
+    page.list.itemActivated.emit(item)
+    assert window.session.path == sidecar
+    assert not page.isVisible()
+
+
+def test_the_sample_is_made_analysed_and_opened(
+    window: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, qtbot: Any
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    button = next(
+        each for each in window.start.findChildren(QPushButton) if each.text() == texts.TRY_SAMPLE
+    )
+    button.click()
+    session = window.session
+    qtbot.waitUntil(lambda: session.document is not None, timeout=180_000)
+    assert session.path == tmp_path / "palette4d" / "sample" / "sample.p4d.json"
+    assert session.clip is not None
+    assert len(session.clip.frames) == 48
+    qtbot.waitUntil(lambda: not window.verbs.dialogs)
