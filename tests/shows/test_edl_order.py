@@ -232,6 +232,9 @@ def test_a_record_that_ends_before_it_begins(tmp_path: Path) -> None:
 def test_a_source_file_is_found_before_the_clip_s_name(tmp_path: Path) -> None:
     for name in ("scene 1", "A001_C002"):
         movie(tmp_path / f"{name}.mov", Fraction(24), "01:00:00:00", 60)
+    text = A.replace(": a", ": S:\\show\\A001_C002.mov")
+    (shot,) = shots(HEAD + text, tmp_path, Fraction(24))
+    assert (Path(shot.clip).stem, shot.name, shot.problem) == ("A001_C002", "A001_C002", "")
     text = A.replace(": a", ": scene 1") + "* SOURCE FILE: A001_C002\n* FROM CLIP IS A STILL\n"
     (shot,) = shots(HEAD + text, tmp_path, Fraction(24))
     assert (Path(shot.clip).stem, shot.name, shot.problem) == ("A001_C002", "scene_1", "")

@@ -45,7 +45,7 @@ LEAVE_OUT = Message(
 
 
 STRIP = 4_000_000
-"""Pixels of a strip of a large frame: what is computed of it needs little more memory."""
+"""Pixels per strip of a large frame. Larger strips need more memory, smaller ones more time."""
 
 
 def strips(height: int, width: int, together: int = 1) -> Iterator[slice]:
@@ -115,7 +115,7 @@ class Clip(abc.ABC):
     skipped : list of int
         Frames skipped so far, in rising order.
     stated : Stated
-        What the files state beside pixels: colour tags, timecode, pixel aspect and so on.
+        Metadata of the files: colour tags, timecode, pixel aspect and so on.
     """
 
     name: str

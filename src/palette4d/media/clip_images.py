@@ -1,4 +1,4 @@
-"""Clips of image files, read through OpenImageIO; `image_header` has what the files state."""
+"""Clips of image files, read through OpenImageIO. `image_header` reads their headers."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class ImageClip(Clip):
     """An image sequence, or a single image as a clip of one frame."""
 
     sequence: ImageSequence = field(kw_only=True)
-    #: What EXR files hold beside the picture, for people; "" for nothing.
+    #: Other contents of EXR files, in words: channels, parts, overscan; "" for none.
     more: str = field(kw_only=True, default="")
     #: Whether frames are read with their overscan: the data window, not the display window.
     whole: bool = field(kw_only=True, default=False)
@@ -194,7 +194,7 @@ def open_images(
 
 
 def _stated(header: Header) -> Stated:
-    """Return what the first frame states, for a movie that is made of the sequence."""
+    """Return the first frame's metadata, for a movie that is made of the sequence."""
     found = {name: value for name, _, value in header.metadata}
     aspect = float(found.get("PixelAspectRatio", 1.0))
     return Stated(

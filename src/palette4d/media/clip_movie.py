@@ -187,8 +187,8 @@ class MovieClip(Clip):
         counted = 0
         with opened_movie(self.path) as container:
             stream = video_stream(container, self.path)
-            # Report a damaged picture instead of concealing the damage. FFmpeg's TIFF has errors of
-            # its own, in what becomes Exif.
+            # Report a damaged picture instead of concealing the damage. FFmpeg's TIFF decoder also
+            # reports whole files, because of their Exif.
             if stream.codec_context.name != "tiff":
                 stream.codec_context.options = {"err_detect": "crccheck+explode"}
             stream.thread_type = "AUTO"

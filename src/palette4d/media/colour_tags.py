@@ -35,7 +35,7 @@ _CAMERA = {1: "Rec.709", 6: "Rec.601", 14: "Rec.2020", 15: "Rec.2020"}
 
 @dataclass(frozen=True)
 class ColourTags:
-    """What a file says about its colours; `UNKNOWN` for what it does not say.
+    """A file's colour tags; a tag that is missing is `UNKNOWN`.
 
     Attributes
     ----------

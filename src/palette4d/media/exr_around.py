@@ -33,7 +33,7 @@ class Around:
 
 
 def described(spec: Any, chosen: list[int], parts: int) -> str:
-    """Return what an EXR's header says that it holds beside its picture; "" for nothing."""
+    """Return the other contents of an EXR in words: channels, parts, overscan; "" for none."""
     found = []
     left, top = spec.full_x - spec.x, spec.full_y - spec.y
     right = spec.x + spec.width - spec.full_x - spec.full_width

@@ -37,7 +37,7 @@ def write_around(
     around : the file and the place of the picture in it.
     pixels : (h, w, 3 or 4) float32, premultiplied; of the picture's whole data window.
     samples : "half" or "float", for the picture's channels; others keep their types.
-    timecode : of the frame, `HH:MM:SS:FF`; by default that of the file.
+    timecode : the frame's, `HH:MM:SS:FF`; by default the file's own.
 
     Raises
     ------

@@ -36,7 +36,7 @@ def of_movie(clip: Clip, frame: int) -> Metadata:
 
 
 def of_another_frame(metadata: Metadata, later: int, rate: Fraction) -> Metadata:
-    """Return the metadata for a frame so many frames later: with a timecode of its own."""
+    """Return the metadata for another frame, `frames` later, with its own timecode."""
     kept = tuple(one for one in metadata if one[0] not in _OF_ONE_FRAME)
     for name, kind, value in metadata:
         if name == TIMECODE and _counts(rate):
@@ -65,7 +65,7 @@ def of_colours(clip: Clip) -> Metadata:
 
 
 def frame_notes(clip: Clip, extension: str) -> list[str]:
-    """Return notes on what frames of this format cannot state of the clip."""
+    """Return notes on the clip's metadata that frames of this format cannot hold."""
     tags, named = clip.stated.tags, clip.encoding
     notes = []
     if clip.stated.timecode and extension in ("exr", "dpx") and not _counts(clip.rate):

@@ -1,6 +1,6 @@
-"""What an image file states: the part and the channels of the picture, sizes, samples, colours.
+"""The headers of image files: part and channels of the picture, size, sample type, colours.
 
-`opened` goes to the part and the channels that hold the picture; `header_of` reads what it states.
+`opened` chooses the part and the channels that hold the picture; `header_of` reads their header.
 """
 
 from __future__ import annotations
@@ -193,7 +193,7 @@ def _bits(spec: Any) -> int:
 
 
 def header_of(spec: Any, chosen: list[int], part: int) -> Header:
-    """Return what a file states of the channels that are read."""
+    """Return the header for the channels that are read."""
     width, height = spec.full_width, spec.full_height
     if 5 <= spec.get_int_attribute("Orientation", 1) <= 8:
         width, height = height, width

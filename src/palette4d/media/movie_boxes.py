@@ -10,7 +10,7 @@ _MOST = 64
 
 
 def boxes(file: BinaryIO) -> Iterator[tuple[bytes, int]]:
-    """Yield the kind of each box, and the bytes of its content, where the file then stands."""
+    """Yield the kind of each box and the size of its content; the file is at the content."""
     at = 0
     for _ in range(_MOST):
         file.seek(at)

@@ -1,4 +1,4 @@
-"""The packets of a movie file: which pictures it has, at which times, without decoding them."""
+"""The index of a movie file: its pictures and their times, from packets, without decoding."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _lacks_index(path: Path) -> bool:
 
 @dataclass(frozen=True)
 class Index:
-    """What the packets of a movie tell.
+    """A movie's pictures and their times.
 
     Attributes
     ----------

@@ -27,7 +27,7 @@ _STRIP = 30_000
 
 
 def _newer(cls: type[Type], value: int) -> Type:
-    """Return a type of side data that PyAV does not know, such as Exif: it would refuse all."""
+    """Return a member for a type that PyAV does not know, such as Exif; else it raises an error."""
     found: Any = object.__new__(cls)
     found._value_, found._name_ = value, f"TYPE_{value}"
     return cast(Type, found)

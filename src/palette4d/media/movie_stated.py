@@ -1,4 +1,4 @@
-"""What a movie file states beside pixels: tags, pixel aspect, fields, timecode and reel."""
+"""The metadata of a movie file: tags, pixel aspect, fields, timecode and reel."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _MOST_INDEX = 256 << 20
 
 
 def stated_by(container: Any, stream: Any, picture: av.VideoFrame) -> Stated:
-    """Return what a movie states; its first picture has its matrix resolved."""
+    """Return a movie's metadata; `picture` is the first one, with its matrix resolved."""
     full = int(picture.color_range) == FULL_RANGE
     aspect = stream.sample_aspect_ratio or stream.codec_context.sample_aspect_ratio
     aspect = Fraction(aspect) if aspect else Fraction(1)
@@ -110,7 +110,7 @@ def _counted_by_track(path: str) -> int:
     except OSError:
         return 0
     # QuickTime File Format, "Timecode sample description": time scale and a frame's duration.
-    # FFmpeg counts at their ratio, whatever the number of frames that stands behind them.
+    # FFmpeg counts at their ratio and ignores the number of frames that follows.
     found = re.search(rb"stsd.{12}tmcd.{16}(.{4})(.{4})", head, re.DOTALL)
     scale, duration = (int.from_bytes(one, "big") for one in found.groups()) if found else (0, 0)
     return round(scale / duration) if duration else 0

@@ -1,4 +1,4 @@
-"""Writing movies through PyAV (FFmpeg's libraries), with what the source states beside pixels.
+"""Writing movies through PyAV (FFmpeg's libraries), with the metadata of the source.
 
 R'G'B' becomes Y'CbCr without any transfer curve. A codec without alpha gets the picture over black.
 """
@@ -56,7 +56,7 @@ class Delivery:
     stated : what the movie states; its tags have a matrix and a range that the codec can hold.
     alpha : whether the movie keeps alpha.
     crf : quality of H.264 and HEVC, 0 (lossless) to 51; None for the default.
-    notes : for the user, what the movie cannot keep.
+    notes : for the user, on metadata that is lost.
     """
 
     codec: Codec
@@ -75,7 +75,7 @@ class Delivery:
         codec: str | None = None,
         crf: int | None = None,
     ) -> Delivery:
-        """Choose the codec, and check that it can hold what the source states.
+        """Choose the codec, and check that it can hold the source's metadata.
 
         Raises
         ------
@@ -166,7 +166,7 @@ def movie_writer(
     size : (int, int); width and height in pixels. Where pixels share a chroma sample, an odd size
         grows by one: the last column or row is repeated.
     rate : frames per second.
-    delivery : codec, tags and so on; by default what the name says, with unknown colours.
+    delivery : codec, tags and so on; by default the codec of the file's name, unknown colours.
     sound : the streams to copy.
 
     Yields
@@ -341,7 +341,7 @@ def _planes(pixels: F32, how: Delivery) -> Iterator[NDArray[np.floating[Any]]]:
     """
     codec, tags = how.codec, how.stated.tags
     pixels = np.nan_to_num(pixels, nan=0.0, posinf=1.0, neginf=0.0)
-    # Far beyond what Y'CbCr holds, so that only its own limits clamp the colours.
+    # Wider than the range of Y'CbCr, so that only the codec's limits clamp the colours.
     room = 1 if how.stated.headroom else 0
     pixels = np.clip(pixels, -room, 1 + room)
     red, blue = LUMA_WEIGHTS[tags.matrix]

@@ -56,7 +56,7 @@ def split(spec: str) -> tuple[str, Reading]:
 
 
 def read_as(spec: str, **asked: Any) -> str:
-    """Return a clip's name that says how it is read; what is None stays as it is in the name.
+    """Add layer, view and matrix to a clip's name; None keeps the name's own.
 
     >>> read_as("a.mov?matrix=709", matrix=None), read_as("a.exr", view="left")
     ('a.mov?matrix=709', 'a.exr?view=left')

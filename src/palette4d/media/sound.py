@@ -21,7 +21,7 @@ from palette4d.media.movie_index import opened_movie
 
 _LAYOUTS = {1: "mono", 2: "stereo", 6: "5.1", 8: "7.1"}
 
-# What a track of sound states.
+# Metadata of a track of sound that is kept.
 _KEPT = ("language", "handler_name", "title")
 
 
@@ -34,7 +34,7 @@ class Sound:
     path : the movie.
     streams : their numbers in it; empty if there are none that the new movie can hold.
     start, end : seconds in the movie; None: from its beginning, to its end. `origin` becomes 0.
-    notes : for the user, what is not copied.
+    notes : for the user, on streams that are not copied.
     """
 
     path: Path
@@ -81,7 +81,7 @@ class Sound:
 
     @contextlib.contextmanager
     def into(self, movie: Any) -> Generator[Copier]:
-        """Add the streams to a movie that is written; yields what copies their packets."""
+        """Add the streams to a movie that is being written; yield the copier of their packets."""
         with opened_movie(self.path) as source:
             chosen = [source.streams[index] for index in self.streams]
             extension = "mp4" if "mp4" in movie.format.name else "mov"

@@ -1,4 +1,4 @@
-"""What the files of a clip state beside pixels, for the movie or the frames that are made of it."""
+"""The metadata of a clip's files, for the movie or the frames that are made of it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Stated:
     field_order : FFmpeg's number for the order in which the file stores and shows fields.
     reel : name of the reel or the camera's roll, or "".
     timecode : `HH:MM:SS:FF` of frame 0 of a movie, or "".
-    texts : (name, text) of what else a movie states, such as its title and time of creation.
+    texts : (name, text) of a movie's other metadata, such as its title and time of creation.
     handler : name of a movie's video track, or "".
     hdr10 : mastering display and light levels, as the options of x265; "" if there are none.
     """

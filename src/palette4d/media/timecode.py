@@ -155,7 +155,7 @@ def encoded(timecode: str) -> int | None:
 
 
 def moved(timecode: str, frames: int, rate: Fraction) -> str:
-    """Return the timecode so many frames later; "" if the rate has no such timecode.
+    """Return the timecode `frames` later; "" if the rate has no such timecode.
 
     >>> moved("00:00:59;29", 1, Fraction(30000, 1001)), moved("23:59:59:23", 1, Fraction(24))
     ('00:01:00;02', '00:00:00:00')

@@ -1,7 +1,7 @@
 """The events of an EDL in the form that OpenTimelineIO's adapter reads.
 
 Sources as long as records, each event with a number of its own, track by track in the record's
-order. A transition gets a line for the clip before it, which goes on below the transition.
+order. A transition gets a line for its outgoing clip.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from palette4d.shows.edl_text import Event, EventLine
 MARK = "PALETTE4D ITEM "
 #: The adapter's member of metadata.
 NAMESPACE = "cmx_3600"
-#: The track of what lies over the background of a key.
+#: Ends the name of the track for the foreground of a key.
 KEYED = "_KEY"
 _NAME = re.compile(r"\*?\s*(FROM|TO|KEY) CLIP NAME\s*:?\s*(.*)")
 _FILE = re.compile(r"\*?\s*SOURCE FILE\s*:\s*(.+)")
@@ -39,9 +39,9 @@ class Item:
     place : in the list of all items.
     line, motion, comments : of its event.
     channel : the track.
-    number : of its event in the list of events; None for what goes on below a transition and has
+    number : of its event in the list of events; None for the outgoing clip of a transition that has
         no event.
-    before : the line of the clip that goes on below the transition, or None for a cut.
+    before : the line of the outgoing clip of a transition; None for a cut.
     """
 
     place: int
@@ -105,9 +105,9 @@ def items_of(events: Sequence[Event], rate: Fraction) -> list[Item]:
 
 
 def _channel(line: EventLine) -> str:
-    """Return the track of an event; all that has a picture and sound is V.
+    """Return the track of an event: V for picture with sound.
 
-    Of audio tracks above A2 the channel is NONE, and a comment AUD has their numbers.
+    The channel NONE means audio tracks above A2, which a comment AUD numbers.
     """
     if line.kind in ("K", "KO"):
         return line.channel + KEYED
@@ -119,7 +119,7 @@ def _channel(line: EventLine) -> str:
 
 
 def _check_order(before: EventLine, event: Event, rate: Fraction) -> None:
-    """Refuse an event that begins while another one of its track goes on."""
+    """Refuse an event that overlaps the one before it on its track."""
     own = event.own
     if own.record[0] < before.record[1]:
         begin, end = (
@@ -133,7 +133,7 @@ def _check_order(before: EventLine, event: Event, rate: Fraction) -> None:
 
 
 def _continues(before: Item | None, line: EventLine) -> bool:
-    """Whether the clip below a transition is the one that ends there."""
+    """Whether the outgoing clip of a transition is the clip that ends there."""
     if before is None or before.line.record[1] != line.record[0]:
         return False
     same_reel = before.line.reel == line.reel
@@ -141,7 +141,7 @@ def _continues(before: Item | None, line: EventLine) -> bool:
 
 
 def _named_before(event: Event) -> Iterator[str]:
-    """Yield the comments for the clip before a transition: its name and speed."""
+    """Yield the comments for the outgoing clip of a transition: its name and speed."""
     out, own = event.lines
     for comment in event.comments:
         name = _NAME.match(comment)
@@ -151,7 +151,7 @@ def _named_before(event: Event) -> Iterator[str]:
 
 
 def _named(event: Event) -> Iterator[str]:
-    """Yield an event's comments, with the names of its own clip and file alone."""
+    """Yield an event's comments without the names of other clips."""
     names = {match[1] for one in event.comments if (match := _NAME.match(one))}
     files = [match[1] for one in event.comments if (match := _FILE.match(one))]
     states_file = any(_STATED.match(one) for one in event.comments)
@@ -169,7 +169,7 @@ def _named(event: Event) -> Iterator[str]:
 
 
 def _is_own(event: Event, names: set[str]) -> bool:
-    """Whether FROM CLIP NAME is the clip of the event, not that below its transition."""
+    """Whether FROM CLIP NAME names the event's own clip, not the outgoing one."""
     if len(event.lines) == 1 or "TO" in names:
         return True
     before, own = event.lines

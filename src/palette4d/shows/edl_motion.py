@@ -17,7 +17,7 @@ class Motion:
 
     Attributes
     ----------
-    speed : how often the media's own speed; 1 if no motion effect says so.
+    speed : multiple of the media's own speed; 1 without a motion effect.
     start : the first frame of the media that `speed` counts from: backwards the last one played.
     problem : the reason why it cannot be followed, or "".
     """
@@ -43,8 +43,8 @@ def is_motion(comment: str) -> bool:
 def motion_of(event: Event, rate: Fraction) -> Motion:
     """Return how an event plays its media, of lines M2 and FREEZE FRAME, or of its lengths.
 
-    The source of an event is what it plays (CMX 3600), or it is as long as the record whatever the
-    speed (DaVinci Resolve). Lengths tell the two apart.
+    An event's source is the media that it plays (CMX 3600), or as long as the record at any speed
+    (DaVinci Resolve). Their lengths tell which.
     """
     (start, end), (begin, stop) = event.own.source, event.own.record
     frames, media = stop - begin, end - start
@@ -130,7 +130,7 @@ def _speeds(event: Event, rate: Fraction) -> list[tuple[float, int | None]]:
 def _speed(fps: float, rate: Fraction) -> float:
     """Return the speed of M2's frames per second: 2 for 48 at 24 and for 47.952 at 23.976.
 
-    Whole percents are likelier than what M2 rounds them to.
+    M2 has one decimal. A whole percentage that rounds to it is taken.
     """
     for base in (round(rate), float(rate)):
         whole = round(100 * fps / base) / 100

@@ -68,7 +68,7 @@ class Event:
 
     Attributes
     ----------
-    lines : one, or for a transition also that of the clip before, without a length.
+    lines : its own; of a transition, before it the outgoing clip's, which has no length.
     comments : as they stand in the file.
     place : the number of the last line of the event in the file, with its comments.
     """
@@ -184,7 +184,7 @@ def _blocks(text: str, rate: Fraction) -> Iterator[tuple[list[EventLine], tuple[
         elif line[:1].isdigit():
             event = _event_line(line, index, rate, drop)
             if block and _goes_on(block, event):
-                comments = []  # those of the clip that ends here
+                comments = []  # they belong to the outgoing clip
             elif block and (comments or int(event.number) != int(block[0].number)):
                 yield block, tuple(comments), place
                 block, comments = [], []

@@ -75,7 +75,7 @@ def _check_rate(rate: Fraction, otio: Any) -> None:
 def _finish(clip: Any, items: list[Item], otio: Any) -> int | None:
     """Put a motion effect and a CDL on an item's clip, and take our comment from it.
 
-    Return the number of its event in the list; None for what the event before plays on.
+    Return the number of its event in the list; None for an outgoing clip without an event.
     """
     own = clip.metadata[edl_items.NAMESPACE]
     comments = [str(comment) for comment in own["comments"]]

@@ -42,7 +42,7 @@ def local_path(url: str) -> Path:
 
 
 def is_elsewhere(url: str) -> bool:
-    """Return whether a file:// URL names another computer, whose path is none of this one."""
+    """Whether a file:// URL names another computer."""
     parts = urllib.parse.urlsplit(url)
     return parts.scheme == "file" and parts.netloc not in ("", "localhost")
 
@@ -70,7 +70,7 @@ class Folder:
         path most like the name's path wins.
         """
         for name in names:
-            path = Path(name)
+            path = Path(name.replace("\\", "/"))  # an EDL may name the whole path of another system
             found = self._by_name.get(_plain(path.name), [])
             same = [f for f in found if f.suffix.lower() == path.suffix.lower()]
             if best := _most_alike(same or found, path):

@@ -26,7 +26,7 @@ ENDING = ".shots.json"
 #: The largest frame number, and part of a rate.
 LARGEST_NUMBER = 2**31 - 1
 
-#: Bytes of a shot's name, with what makes it different from others.
+#: Bytes of a shot's name with its suffix, such as _f120.
 _LONGEST_NAME = 200
 
 DONE, FAILED, TO_DO = "done", "failed", "to do"

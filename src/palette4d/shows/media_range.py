@@ -25,7 +25,7 @@ ROUNDING = Fraction(1, 1000)
 
 @dataclasses.dataclass(frozen=True)
 class Level:
-    """A clip, or what it lies in.
+    """A clip, or a compound around it.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Level:
 
 @dataclasses.dataclass(frozen=True)
 class Shown:
-    """What an edit shows of a clip's media.
+    """The range of a clip's media that an edit shows.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Shown:
         known, because an item before it has no length.
     start, end : the media's time in seconds. At the media's own speed `end` is behind the last
         frame, else it is a time in the last frame.
-    speed : how often the media's own speed; negative if it plays backwards, 0 if it stands still.
+    speed : multiple of the media's own speed; negative backwards, 0 for a freeze frame.
     """
 
     record: Fraction | None
@@ -96,9 +96,9 @@ def seconds(time: Any) -> Fraction:
 
 
 def shown(levels: Sequence[Level], rate: Fraction) -> Shown | None:
-    """Return what an edit shows of a clip; None if it shows nothing of it.
+    """Return the range of a clip's media that an edit shows; None if it shows none.
 
-    `levels` begins with the clip and ends with the track. `rate` is that of the edit.
+    `levels` begins with the clip and ends with the track. `rate` is the edit's.
     """
     schema = library().schema
     clip = levels[0].item

@@ -51,7 +51,7 @@ class Shot:
     step : the distance between frames.
     place : the place in the edit.
     problem : the reason why it cannot be analysed, or "".
-    speed : how often the media's own speed the edit plays it; negative backwards, 0 a freeze frame.
+    speed : multiple of the media's own speed; negative backwards, 0 for a freeze frame.
     cdl : the CDL that the edit states for it.
     """
 

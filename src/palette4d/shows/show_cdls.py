@@ -1,6 +1,6 @@
 """One CDL for each shot of a show: as a collection (.ccc), and in the comments of an EDL.
 
-A shot's CDL is that of the exported frame nearest to the middle of what the edit shows.
+A shot's CDL is the one of the exported frame nearest to the middle of the edit's range.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from palette4d.shows.manifest import DONE, Manifest
 
 
 def check(target: Path, ending: str, format_name: str | None, force: bool, made: Path) -> None:
-    """Refuse early what cannot be written; the export makes the folder `made`."""
+    """Refuse outputs that cannot be written; the export makes the folder `made`."""
     if target.suffix.lower() != ending:
         raise Palette4dError(f"{target}: expected the name of an {ending} file")
     if format_name not in ("cc", "ccc", "cdl"):

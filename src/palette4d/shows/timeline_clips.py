@@ -82,7 +82,7 @@ class EditList:
 def read(path: Path, rate: Fraction | None = None) -> EditList:
     """Read an .otio, .otioz, .otiod or .edl file with exactly one timeline.
 
-    `rate` is that of an EDL's timecodes, by default 24; other files state their rate.
+    `rate` is the rate of an EDL's timecodes, by default 24; other files state theirs.
     """
     return timeline_files.in_child(path, clips_of, path, rate)
 
@@ -190,7 +190,7 @@ class _Walk:
         schema, reference = self.otio.schema, clip.media_reference
         numbered = isinstance(reference, schema.ImageSequenceReference)
         known = getattr(reference, "available_range", None)
-        # The times of what stands beside the clip are none of its media's.
+        # Items beside the clip may have other rates.
         rate = own_rate(clip.trimmed_range() if known is None else known)
         if numbered and reference.rate > 0:
             rate = rate_of(reference.rate)
@@ -239,7 +239,7 @@ class _Walk:
 
 
 def _end(place: Fraction | str, item: Any) -> Fraction | str:
-    """Return the end of a track's item that begins at a place; a text if there is no such time."""
+    """Return the end of an item that begins at a place; a text if it is not known."""
     if isinstance(place, str):
         return place
     try:
@@ -253,7 +253,7 @@ def _end(place: Fraction | str, item: Any) -> Fraction | str:
 
 
 def _stated(item: Any, name: str, kind: type[Of]) -> Of | None:
-    """Return what the EDL's adapter, or ours, says of a clip or a timeline; None if nothing."""
+    """Return a member of the EDL's metadata of a clip or a timeline; None without one."""
     try:
         found = item.metadata[NAMESPACE][name]
     except (KeyError, TypeError):

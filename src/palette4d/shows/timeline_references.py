@@ -25,7 +25,7 @@ NAMESPACE, VERSION = "palette4d", 1
 
 
 def check(manifest: Manifest, manifest_path: Path, target: Path, force: bool, made: Path) -> Path:
-    """Return the timeline of a show, and refuse early what `write` would refuse.
+    """Return the timeline of a show; refuse outputs that `write` would refuse.
 
     The export makes the folder `made`.
     """

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import re
 from fractions import Fraction
 from pathlib import Path
 from typing import Literal
@@ -40,7 +41,7 @@ SECONDS, MEGABYTES = 300.0, 8192
 class Media:
     """A clip's first and last frame, all of them in words, and whether it is a movie, or a still.
 
-    `rate` is that of a movie: images rarely state theirs. An opened clip may hold a million
+    `rate` is for movies: images rarely state theirs. An opened clip may hold a million
     numbers, and an edit thousands of clips.
     """
 
@@ -181,7 +182,7 @@ class _Finder:
         return first + offset, last + offset
 
     def counted(self, clip: EditClip, spec: str, media: Media) -> Fraction:
-        """Return the rate that counts a clip's frames: the edit's, or that of the movie's file.
+        """Return the rate at which a clip's frames count: the edit's, or the movie's own.
 
         23.976 and 24 count alike. An edit that has another rate for all of the movie's frames plays
         them frame for frame; else its times are seconds. Timecodes of an EDL count frames of the
@@ -259,10 +260,14 @@ class _Finder:
 def _name(clip: str) -> str:
     """Return the name of a clip's shot, which the node finds by its media: without an extension.
 
+    Some programs name the whole path.
+
     The text after the last dot of a clip's name need not be an extension.
     """
     known = clip_sequence.MOVIE_EXTENSIONS | clip_sequence.IMAGE_EXTENSIONS | find_media.CAMERA
-    return file_safe(_core.clip_name(clip) if clip_sequence.extension(clip) in known else clip)
+    if clip_sequence.extension(clip) not in known:
+        return file_safe(clip)
+    return file_safe(_core.clip_name(re.split(r"[\\/]", clip)[-1]))
 
 
 def _media(spec: str) -> Media:
