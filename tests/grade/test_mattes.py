@@ -150,6 +150,14 @@ def test_equal_picks_learn_equal_mattes(document: Document) -> None:
     assert list(document.fields()["mattes"]["grids"]) == [first]
 
 
+def test_holds_that_are_disabled_are_not_learned_from(document: Document) -> None:
+    alone = document.pick(0, pixel=CLICK, box=9, to="#2040b0").matte
+    hold = document.hold(0, pixel=(130.0, 50.0), box=9)
+    assert document.grade.pick("p1").matte != alone
+    document.change_pick(hold.id, enabled=False)
+    assert document.grade.pick("p1").matte == alone
+
+
 def test_mattes_that_nothing_uses_are_left_out(document: Document) -> None:
     document.pick(0, pixel=CLICK, box=9, to="#2040b0")
     document.undo()

@@ -18,48 +18,6 @@
 namespace palette4d {
 namespace {
 
-template <class View>
-void check_view(const View& view, const char* name) {
-    const std::string what = std::string("recolour: the ") + name + " image ";
-    if (view.channels != 3 && view.channels != 4) {
-        throw std::invalid_argument(what + "has " + std::to_string(view.channels) +
-                                    " channels; expected 3 or 4");
-    }
-    if (view.width < 0 || view.height < 0) {
-        throw std::invalid_argument(what + "is " + std::to_string(view.width) + " by " +
-                                    std::to_string(view.height) + "; expected no negative size");
-    }
-    if (view.width == 0 || view.height == 0) return;
-    if (view.data == nullptr) throw std::invalid_argument(what + "has no data");
-    const auto row = static_cast<std::ptrdiff_t>(sizeof(float)) * view.width * view.channels;
-    if (view.height > 1 && std::abs(view.row_bytes) < row) {
-        throw std::invalid_argument(what + "has rows " + std::to_string(view.row_bytes) +
-                                    " bytes apart; expected at least " + std::to_string(row));
-    }
-}
-
-void check_recolouring(const ConstImageView& in, const ImageView& out,
-                       const RecolourOptions& options) {
-    check_view(in, "input");
-    check_view(out, "output");
-    if (in.width != out.width || in.height != out.height || in.channels != out.channels) {
-        const auto size = [](const auto& view) {
-            return std::to_string(view.width) + " by " + std::to_string(view.height) + " with " +
-                   std::to_string(view.channels) + " channels";
-        };
-        throw std::invalid_argument("recolour: the output image is " + size(out) +
-                                    "; expected that of the input image, " + size(in));
-    }
-    if (!std::isfinite(options.strength)) {
-        throw std::invalid_argument("recolour: the strength is not finite");
-    }
-    if (options.threads < 0) {
-        throw std::invalid_argument("recolour: " + std::to_string(options.threads) +
-                                    " threads; expected 0 (one per processor) or more");
-    }
-    resolved(options.instructions);
-}
-
 /// Rows whose code values differ from the palette's: pixels are collected, converted, and
 /// recoloured as one row.
 class ConvertedRows : public RowWorker {
@@ -161,7 +119,14 @@ RecolourCounts Recolourer::apply(const ConstImageView& in, const ImageView& out,
                                  const RecolourOptions& given) const {
     RecolourOptions options = given;
     options.premultiplied = options.premultiplied && in.channels == 4;
-    check_recolouring(in, out, options);
+    if (!std::isfinite(options.strength)) {
+        throw std::invalid_argument("recolour: the strength is not finite");
+    }
+    if (options.threads < 0) {
+        throw std::invalid_argument("recolour: " + std::to_string(options.threads) +
+                                    " threads; expected 0 (one per processor) or more");
+    }
+    resolved(options.instructions);
     if (in.width == 0 || in.height == 0) return {};
     if (!moves() || options.strength == 0) {
         copy_rows(in, out);

@@ -10,8 +10,9 @@
 
 namespace palette4d {
 
-/// A float32 image that the caller owns: `row_bytes` may be negative or padded, `channels` is 3 or
-/// 4, interleaved (the fourth is alpha and is copied).
+/// A float32 image that the caller owns and has checked: `row_bytes` may be negative or padded,
+/// `channels` is 3 or 4, interleaved (the fourth is alpha and is copied). An output has the size of
+/// its input.
 template <class Number, class Byte>
 struct ImageOf {
     Number* data;

@@ -197,10 +197,8 @@ def difference(before: State, after: State, label: str = "") -> Edit:
     )
 
 
-def merged(
-    base: State, mine: State, theirs: State, taken: Collection[str]
-) -> tuple[dict[Key, Any], dict[Key, str]]:
-    """Merge the changes of two writers; return the state and the new ids of my stops and picks.
+def merged(base: State, mine: State, theirs: State, taken: Collection[str]) -> dict[Key, Any]:
+    """Return the state with the changes of two writers.
 
     Parameters
     ----------
@@ -237,7 +235,7 @@ def merged(
         place = _place(value) if kind == "handle" else None
         if place and places.setdefault(place, id_) != id_:
             raise _conflict(f"edge {place[0]} at frame {place[1]:g}")
-    return result, renamed
+    return result
 
 
 def _put(state: dict[Key, Any], key: Key, value: Any) -> None:

@@ -70,13 +70,12 @@ def merged(
         )
     taken = {*own.handles.vertices, *own.handles.edges}
     try:
-        state, names = edits.merged(file.state, own.state, other.state, taken)
+        state = edits.merged(file.state, own.state, other.state, taken)
     except Palette4dError as error:
         raise Palette4dError(f"{own.name}: {error.message.marked}") from None
     before = file.history.done
     new = history.done[len(before) :] if history.done[: len(before)] == before else ()
     label = new[0].label if len(new) == 1 else "edits of two programs"
     if (step := edits.difference(other.state, state, label).undoable()).changes:
-        # Steps that were undone do not fit what has another id now.
-        steps = History((*steps.done, step), () if names else history.undone)
+        steps = History((*steps.done, step), history.undone)
     return other.with_mattes(own.mattes).with_state(state), steps

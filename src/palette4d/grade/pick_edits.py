@@ -59,20 +59,8 @@ class Asked(When, total=False):
     follow : bool
         Follow the colour through the clip. Without the clip, or without this, the pick is at
         the same colour in all frames.
-    toward : {"shift", "colour"}
-        At other frames: the same change, or the same new colour.
-    start, until : float, optional
-        First and last frame with the full change; default: the clip's.
-    fade : float
-        Frames of the ramps before `start` and after `until`; beyond them nothing changes.
-    whole_hue : bool
-        Take all colours of the hue, as a qualifier does; learn nothing.
-    reach : float
-        Log odds, -8..8: above 0 the pick takes more colours, below 0 fewer.
-    softness : float
-        How soft the matte is, 0..1.
-    lightness : (float, float)
-        The lowest and the highest lightness that change.
+    toward, start, until, fade, whole_hue, reach, softness, lightness
+        Attributes of `palette4d.grade.picks.Pick`.
     any_value : bool
         Take colours such as 255 128 0 as they are.
     """

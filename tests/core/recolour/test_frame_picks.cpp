@@ -430,28 +430,3 @@ TEST(kernels_of_all_sets_agree_where_stages_need_them) {
         }
     }
 }
-
-TEST(picks_that_are_no_picks_are_refused) {
-    const FramePick good = ball(kRed, {0.1, 0, 0}, 0.1);
-    const auto refused = [&](const FramePicks& all) {
-        CHECK_THROWS(std::invalid_argument, with(all));
-    };
-    FramePick bad = good;
-    bad.colour[1] = std::nan("");
-    refused({{bad}, nullptr, nullptr});
-    bad = good;
-    bad.change[2] = std::numeric_limits<double>::infinity();
-    refused({{bad}, nullptr, nullptr});
-    for (const double strength : {0.0, -1.0, 1.5, std::nan("")}) {
-        bad = good;
-        bad.strength = strength;
-        refused({{bad}, nullptr, nullptr});
-    }
-    bad = good;
-    bad.matte = nullptr;
-    refused({{bad}, nullptr, nullptr});
-    bad.matte = std::make_shared<const FrameMatte>(7, 0.5f);
-    refused({{bad}, nullptr, nullptr});
-    refused({{good}, bad.matte, nullptr});
-    CHECK(with({{good}, nullptr, nullptr}).moves());
-}

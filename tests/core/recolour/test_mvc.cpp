@@ -446,13 +446,3 @@ TEST(what_is_not_finite_stays_unknown) {
         for (const double x : mvc(cube(), p)) CHECK(std::isnan(x));
     }
 }
-
-TEST(bad_palettes_are_refused) {
-    const double nan = std::numeric_limits<double>::quiet_NaN();
-    CHECK_THROWS(std::invalid_argument, PaletteBody({}, {}));
-    CHECK_THROWS(std::invalid_argument, PaletteBody({{nan, 0, 0}}, {}));
-    CHECK_THROWS(std::invalid_argument, PaletteBody({{0, 0, 0}, {1, 1, 1}}, {{0, 1, 0}}));
-    CHECK_THROWS(std::invalid_argument, PaletteBody(cube().rgb, {}));
-    CHECK_THROWS(std::invalid_argument, PaletteBody(cube().rgb, {{0, 1, 8}}));
-    CHECK_THROWS(std::invalid_argument, PaletteBody(cube().rgb, {{0, -1, 2}}));
-}
