@@ -292,3 +292,9 @@ def test_a_long_edl_takes_linear_time(tmp_path: Path) -> None:
     lines = [f"{i:06d} A V C {i} {i + 1} {i} {i + 1}\n" for i in range(20000)]
     events = edl_text.events_of("".join(lines), Fraction(24))
     assert [one.own.source[0] for one in events] == list(range(20000))
+
+
+def test_the_frame_code_mode_in_small_letters(tmp_path: Path) -> None:
+    text = event("00:10:00:00 00:10:01:00", "01:00:00:00 01:00:01:00")
+    (clip,) = clips("fcm: drop frame\n" + text, tmp_path, Fraction(30000, 1001))
+    assert clip.shown.frames(clip.rate) == (17982, 18011)

@@ -126,7 +126,12 @@ def title_of(text: str) -> str:
 
 def states_drop(text: str) -> bool:
     """Whether an EDL has a line FCM: DROP FRAME."""
-    return any(_drops(line) for line in text.splitlines() if line.strip().startswith("FCM:"))
+    return any(_drops(line) for line in text.splitlines() if _is_mode(line.strip()))
+
+
+def _is_mode(line: str) -> bool:
+    """Whether a line states the frame code mode; some programs write it in small letters."""
+    return line[:4].upper() == "FCM:"
 
 
 def _drops(line: str) -> bool:
@@ -179,7 +184,7 @@ def _blocks(text: str, rate: Fraction) -> Iterator[tuple[list[EventLine], tuple[
     place = 0
     for index, raw in enumerate(text.splitlines(), start=1):
         line = raw[:LONGEST].strip()  # patterns take long for lines that no program writes
-        if line.startswith("FCM:"):
+        if _is_mode(line):
             drop = _drops(line)
         elif line[:1].isdigit():
             event = _event_line(line, index, rate, drop)
