@@ -167,3 +167,27 @@ def test_hover_and_selection_are_shared(view: SolidView) -> None:
     before = view.grab().toImage()
     view.session.select("v3")
     assert view.grab().toImage() != before
+
+
+def test_what_an_edit_spoils_is_told_beside_the_solid(view: SolidView) -> None:
+    palette = view.palette_now()
+    assert palette is not None
+    document = view.session.document
+    assert document is not None
+    before, _ = view.places(palette, view.view_of(palette))
+    middle = palette.rgb.mean(axis=0)
+    for id_ in document.grade.core.polytope.vertex_ids:  # through the middle: inside out
+        old = np.array(document.grade.colour(id_))
+        view.session.edit(lambda d, i=id_, o=old: d.set(i, rgb=(2 * middle - o).tolist()))
+        if any(found.any() for found in troubles(view.palette_now() or palette)):
+            break
+    spoilt = view.palette_now()
+    assert spoilt is not None
+    words = view.painter.words_width(spoilt)
+    assert 100 < words < view.width() / 2
+    for points in view.places(spoilt, view.view_of(spoilt)):
+        assert points[:, 0].min() > words
+    view.session.edit(lambda d: d.undo())
+    again, _ = view.places(palette, view.view_of(palette))
+    assert view.painter.words_width(palette) == 0
+    assert np.allclose(again, before)

@@ -3,6 +3,7 @@
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QVBoxLayout, QWidget
 
 from palette4d.studio import texts
+from palette4d.studio.row_names import with_row_names
 from palette4d.studio.session import Session
 
 
@@ -31,9 +32,9 @@ class History(QWidget):
         rows = [texts.BEGINNING] if document is not None else []
         done = 0
         if document is not None:
-            rows += [edit.label for edit in document.history.done]
+            steps = [*document.history.done, *reversed(document.history.undone)]
+            rows += [with_row_names(document.grade, edit.label) for edit in steps]
             done = len(document.history.done)
-            rows += [edit.label for edit in reversed(document.history.undone)]
         self.list.clear()
         for k, text in enumerate(rows):
             item = QListWidgetItem(text)

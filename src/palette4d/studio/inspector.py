@@ -40,6 +40,7 @@ from palette4d.studio.choice import Choice
 from palette4d.studio.colour_widgets import Bar, Swatch, Wheel
 from palette4d.studio.pick_list import PickList, Versions
 from palette4d.studio.pick_panel import PickPanel
+from palette4d.studio.row_names import row_name
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
 from palette4d.studio.states import Place
@@ -299,6 +300,8 @@ class Inspector(QWidget):
         name, called = target.id, ""
         if document is not None:
             called = document.grade.colour_names.get(target.id) or document.grade.called(target.id)
+            if target.kind == "edge":
+                name = row_name(document.grade, target.id)
         if target.place is not None:
             name = texts.PLACE.format(x=target.place.x, y=target.place.y)
         self.title.setText(f"{name}{more}")

@@ -23,8 +23,8 @@ Spoilt = tuple[NDArray[np.bool_], NDArray[np.bool_]]
 
 #: The radius of a disc, and of the place where an edited colour was.
 DISC, ORIGIN = 6.5, 3.6
-#: Behind words that stand over the solid.
-PLATE = QColor(38, 38, 38, 215)
+#: The width of the words beside the solid, which say what an edit spoils.
+WORDS = 150.0
 AXIS_NAMES = ("R", "G", "B")
 #: A face is drawn in this many strips, for a smooth gradient; in fewer while something moves.
 STRIPS, MOVING_STRIPS = 5, 2
@@ -64,6 +64,12 @@ class SolidPainter:
         self._paint_words(painter, spoilt)
         paint.focus_frame(painter, self.view)
         painter.end()
+
+    def words_width(self, palette: Palette) -> float:
+        """Return the width of the words beside the solid; 0 if there is nothing to say."""
+        if not any(found.any() for found in troubles(palette)):
+            return 0.0
+        return min(WORDS, self.view.width() * 0.4)
 
     def _paint_solid(self, painter: QPainter, palette: Palette, spoilt: Spoilt) -> None:
         view = self.view.view_of(palette)
@@ -275,7 +281,8 @@ class SolidPainter:
             counted(int(turned.sum()), texts.FLIPPED_FACE, texts.FLIPPED_FACES),
         )
         whys = (texts.CONCAVE_WHY, texts.FLIPPED_WHY)
-        top = 6.0
+        # While a colour is dragged, they may stand over the solid: it stays where it is.
+        wide, top = min(WORDS, self.view.width() * 0.4) - 8, 6.0
         flags = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap
         for head, why, found in zip(heads, whys, spoilt, strict=True):
             if not found.any():
@@ -283,7 +290,6 @@ class SolidPainter:
             for text, colour in ((f"⚠ {head}", theme.WARNING), (why, theme.TEXT)):
                 box = QRectF(8, top, wide, self.view.height())
                 box = painter.boundingRect(box, int(flags), text)
-                painter.fillRect(box.adjusted(-4, -1, 4, 1), PLATE)
                 painter.setPen(QColor(colour))
                 painter.drawText(box, int(flags), text)
                 top = box.bottom() + 1

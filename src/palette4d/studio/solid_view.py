@@ -77,6 +77,7 @@ class SolidView(QWidget):
         self.azimuth, self.elevation, self.zoom = AZIMUTH, ELEVATION, 1.0
         self.axis: int | None = None  #: the axis whose key is down
         self._drag: Drag | None = None
+        self._left = 0.0  #: pixels at the left that have words
         self._pixels: tuple[object, F64, NDArray[np.uint8]] | None = None
         self._extent: F64 | None = None
         self._drawn: Palette | None = None  #: at the last change of the document
@@ -134,13 +135,16 @@ class SolidView(QWidget):
         """Return the projection; while a colour is dragged it stays as it was."""
         if self._drag is None or self._drag.index is None or self._extent is None:
             self._extent = extent_of([Shape(palette.rgb, palette.edited, palette.faces)])
-        size = max(60.0, min(self.width() - 34.0, self.height() - 34.0)) * self.zoom
+        if self._drag is None:  # what a drag spoils moves nothing below the pointer
+            self._left = self.painter.words_width(palette)
+        room = self.width() - self._left
+        size = max(60.0, min(room - 34.0, self.height() - 34.0)) * self.zoom
         # The size of a ball around everything: it fits from all sides. A colour that an edit moves
         # far away does not shrink the rest.
         far = np.linalg.norm(self._extent - 0.5, axis=1)
         near = float(far[: len(self._extent) - len(palette.edited)].max())
         away = float(min(far.max(), FARTHEST * near))
-        centre = np.array([self.width() / 2, -(self.height() - 6) / 2])
+        centre = np.array([self._left + room / 2, -(self.height() - 6) / 2])
         return View(centre, size / (2 * away)).turned(self.azimuth, self.elevation)
 
     def places(self, palette: Palette, view: View) -> tuple[F64, F64]:

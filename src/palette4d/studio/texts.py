@@ -15,7 +15,7 @@ CLIP_MISSING = (
     "found no clip at {source}; the palette can be edited. File > Find the clip… shows it"
 )
 OTHER_SIZE = (
-    "the palette is of a clip with {own} pixels, this clip has {found}: check that it is the clip"
+    "the palette was made from a {own} clip, this one is {found}: check that it is the same clip"
 )
 OWN_CLIP = "File > Find the clip… opens the palette's own"
 LACKS_FRAMES = "the clip lacks {count} frames of the palette, the first is {first}"
@@ -96,8 +96,8 @@ HANDLES = "{count} handles"
 PICKS = "picks {count}"
 NO_PALETTE = "no palette yet"
 AS_IS_STATUS = "unknown encoding: code values as they are"
-LUT_ERROR = "while moving within {error:.1f}/255 of the view"
-OUTSIDE, NEARLY_NONE = "{share} of the pixels outside", "<0.1 %"
+LUT_ERROR = "preview LUT error while dragging: {error:.1f}/255"
+OUTSIDE, NEARLY_NONE = "{share} of the pixels outside the palette", "<0.1 %"
 RECOVERY = "edits that could not be saved are in {copy}; File > Open loads them"
 
 UNEXPECTED = "something went wrong in the program: {error}. Your edits are kept"
@@ -239,7 +239,7 @@ GESTURES = (
     ("timeline", "Shift-wheel, middle button", "pan"),
     ("solid", "drag the ground", "turn the solid"),
     ("solid", "drag a colour", "move it in the plane of the screen"),
-    ("solid", "X, Y or Z while dragging", "move along red, green or blue alone"),
+    ("solid", "X, Y or Z while dragging", "move along red, green or blue only"),
     ("solid", "Alt-arrows", "move the selected colour by a hundredth"),
     ("solid", "arrows, wheel", "turn, zoom"),
     ("solid", "double-click", "look from the front again"),
@@ -299,7 +299,7 @@ MORE = "More"
 CHOOSE = "Choose…"
 RUNNING = "running"
 STOPPING = "stopping"
-CANCELLED = "stopped; files that were finished before stay, the one under way is gone"
+CANCELLED = "stopped; finished files are kept, the unfinished one was removed"
 DONE = "done"
 FAILED = "failed; the reason is below"
 ANALYZE = "Analyse"
@@ -432,19 +432,19 @@ FADE = "Fades, before and after the range"
 FADE_OF, NO_FADE = "{frames} frames", "none"
 FADE_SET = "{id} fades over {frames} frames before and after its range"
 SAME_EVERYWHERE = "{id} becomes the same colour in all frames"
-SAME_SHIFT = "{id} changes by the same way in all frames"
+SAME_SHIFT = "{id} shifts by the same offset in all frames"
 RESET = "Reset the selected handles"
 GO_THERE = "Go to frame {frame}"
-ROW_TIP = "edge {id}: double-click adds a stop"
-STOP_ADDED = "added a stop to {edge} at frame {frame}"
+ROW_TIP = "double-click adds a stop"
+STOP_ADDED = "added a stop to {row} at frame {frame}"
 STOP_MOVED = "moved {id} to frame {frame}"
-NO_STOP_HERE = "no room for a stop on {edge} here: choose a frame between two handles"
+NO_STOP_HERE = "no room for a stop on {row} here: choose a frame between two handles"
 SELECT_A_ROW = "select a row or a handle first; then S adds a stop at the playhead"
 WAS_RESET = "reset {ids}"
 
 # --------------------------------------------------------------------------------------- the solid
 SOLID_HINT = "drag to turn · drag a colour: X, Y, Z along R, G, B"
-SOLID_AXIS = "along {axis} alone"
+SOLID_AXIS = "along {axis} only"
 COLOUR_MOVED = "moved a colour"
 CONCAVE_EDGE, CONCAVE_EDGES = "concave edge", "concave edges"
 CONCAVE_WHY = "Notched: gradients bend there."
@@ -482,10 +482,10 @@ SCOPES: dict[Literal["handle", "track", "palette"], str] = {
 SCOPE_TIPS = {
     "handle": "A new colour changes the selected handles",
     "track": "A new colour changes the whole track of the selected colour",
-    "palette": "A new colour changes the whole palette by the same way",
+    "palette": "A new colour shifts the whole palette by the same offset",
 }
 RAMP = "Ramp"
-RAMP_TIP = "The way from this handle to the next; without a selection: the clip's"
+RAMP_TIP = "How the colour goes to the next handle; with nothing selected: the clip's default"
 RAMP_OF_CLIP = "as the clip"
 RAMPS = {"linear": "linear", "smooth": "smooth", "hold": "hold"}
 RAMP_SET = "ramp: {ramp}"
@@ -518,38 +518,40 @@ CLOSES_SOON = "the window closes when the colour is followed; close it again to 
 NOT_FOLLOWED = "kept, but not followed through the clip: {why}"
 FOLLOWING = "following the colour: {done} of {total} frames"
 PICK_LIST = "Picks, holds and locks"
-PICK_COLUMNS = ("id, kind, frame", "acts")
+PICK_COLUMNS = ("name, kind, frame", "acts in")
 ALL_FRAMES = "all frames"
 LOCKED = "{id} is locked"
-LOCKED_MOVED = "locked against picks, changed by hand: {ids}"
+LOCKED_MOVED = "locked against picks, but changed by hand: {ids}"
 RANGE_SET = "{id} acts from frame {start} to {until}"
 PICK_TIP = "from frame {} to {}, fades of {} frames; the picture shows what it takes"
 PICK_SHAPED = "the matte of {id} is changed"
 REACH, SOFTNESS, LIGHTNESS_RANGE = "Reach", "Softness", "Lightness"
 REACH_TIP = "Above 0 it takes more colours, below 0 fewer"
 SOFTNESS_TIP = "How soft the edge of its matte is"
-LIGHTNESS_TIP = "It changes only what is this light. Up and down choose the end that keys move"
+LIGHTNESS_TIP = (
+    "Only this range of lightness changes. Up and Down choose the end that the arrows move"
+)
 WHOLE_HUE = "All of its hue"
-WHOLE_HUE_TIP = "It takes all colours of its hue, as a qualifier does; nothing is learned"
+WHOLE_HUE_TIP = "It takes every colour of its hue, like a hue qualifier"
 ITS_HUE, ITS_COLOURS = "{id} takes all of its hue", "{id} takes the colours of its place"
 ADD_TO_IT = "Add to it"
 ADD_TO_IT_TIP = (
-    "Then paint in the picture what belongs to it too; a click is a box. Shift-drag does the same"
+    "Then paint over what else belongs to it; a click adds a box. Shift-drag does the same"
 )
 HOLD_TOOL = "Hold…"
 HOLD_TOOL_TIP = "Then click in the picture what must stay. Alt-click does the same"
 MATTE_BUTTON = "Matte"
 MATTE_TIP = "Show what it takes; the rest is dark and grey (M)"
 AREA_ADDED = "{id} has learned what was added"
-LOOKING = "looking what it takes…"
+LOOKING = "measuring what it takes…"
 TAKES, KEEPS = "Takes {share} of frame {frame}.", "Keeps {share} of frame {frame}."
 ALSO_TAKES = "Also takes {share} elsewhere, most of it at {x}, {y}."
 LEAVES_OUT = "Leaves out {share} beside it, at {x}, {y}."
 ADD_HOLD, ADD_HOLD_TIP = "Add this hold", "Then it takes {share} elsewhere"
 ADD_BOX, ADD_BOX_TIP = "Add this box", "Then it takes {share}"
 FLOODS = (
-    "This may be more than one thing. Look at its matte. A hold on what must stay takes less, "
-    "and so does a lower reach."
+    "This may be more than one thing: look at its matte. Add a hold on what must stay, or lower "
+    "the reach."
 )
 ENABLED, DISABLED = "{ids} acts again", "{ids} does not act"
 REMOVE = "Remove"

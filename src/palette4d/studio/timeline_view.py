@@ -25,6 +25,7 @@ from palette4d.studio import grade_steps, texts, theme
 from palette4d.studio.frame_strip import FrameStrip
 from palette4d.studio.menu_entries import TIMELINE_ACTIONS, VIEW
 from palette4d.studio.panel_menus import view_actions
+from palette4d.studio.row_names import row_name
 from palette4d.studio.session import Session
 from palette4d.studio.session_events import Event
 from palette4d.studio.timeline_menu import menu_for
@@ -373,7 +374,7 @@ class TimelineView(QWidget):
             line = f"{kind} {disc.id}: {self._called(disc.id)}\n{before}"
             return line if before == after else f"{line} → {after}"
         if hit.what == "band":
-            return f"{self._called(hit.id)}\n{texts.ROW_TIP.format(id=hit.id)}"
+            return f"{self._row(hit.id)}: {self._called(hit.id)}\n{texts.ROW_TIP}"
         for pick, _ in self.places.lanes() if hit.what == "pick" else ():
             if pick.id == hit.id:
                 _, start, until, _ = self.places.reach(pick)
@@ -384,6 +385,10 @@ class TimelineView(QWidget):
     def _called(self, id_: str) -> str:
         document = self.session.document
         return "" if document is None else document.grade.called(id_)
+
+    def _row(self, id_: str) -> str:
+        document = self.session.document
+        return id_ if document is None else row_name(document.grade, id_)
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         """Show the menu of what is under the pointer."""
@@ -416,10 +421,10 @@ class TimelineView(QWidget):
         index = content.edge_ids.index(edge)
         start, end = content.frames[list(content.edges[index])]
         if not start < frame < end:
-            self.session.say(texts.NO_STOP_HERE.format(edge=edge), "warning")
+            self.session.say(texts.NO_STOP_HERE.format(row=self._row(edge)), "warning")
             return
         rgb = content.colours(index, np.array([frame]), edited=True)[0].tolist()
-        text = texts.STOP_ADDED.format(edge=edge, frame=style.number(frame))
+        text = texts.STOP_ADDED.format(row=self._row(edge), frame=style.number(frame))
         made = self.session.edit(lambda document: document.stop(edge, frame=frame, rgb=rgb), text)
         if made is not None:
             self.session.select(made)

@@ -23,6 +23,7 @@ from palette4d.grade.picks import Pick
 from palette4d.studio import texts, theme
 from palette4d.studio.drafts import DRAFT
 from palette4d.studio.preview import MATTE_GREY, REST_LIFT, REST_LIGHT
+from palette4d.studio.row_names import row_name
 from palette4d.studio.screen_colours import on_screen
 
 if TYPE_CHECKING:
@@ -30,8 +31,8 @@ if TYPE_CHECKING:
 
 #: From this zoom on pixels are squares.
 SQUARES = 2.0
-#: The most weights that the probe lists.
-WEIGHTS = 4
+#: The most weights that the probe lists, and a name as wide as their longest one.
+WEIGHTS, WIDEST_NAME = 4, "v12 greyish teal"
 
 
 class ViewerPainter:
@@ -252,6 +253,8 @@ class ViewerPainter:
         shares = [(id_, share) for id_, share in shares if abs(share) >= 0.005]
         line = measure.height() + 1
         width = max(measure.horizontalAdvance("in  " + " -0.0000" * len(probe.source)), 150.0)
+        named = measure.horizontalAdvance(WIDEST_NAME) if probe.weights else 0.0
+        width = max(width, named + 110.0)
         # As tall as it can become: it stays as it is while the pointer moves.
         height = line * (len(rows) + (WEIGHTS if probe.weights else 0))
         size = QSizeF(width + 16, height + 14)
@@ -273,16 +276,20 @@ class ViewerPainter:
         colours = self._palette_colours()
         for id_, share in shares:
             painter.setPen(QColor(theme.TEXT))
-            painter.drawText(QPointF(box.left() + 8, y), f"{id_}")
-            full = QRectF(
-                box.left() + 52, y - measure.ascent() + 3, width - 88, measure.ascent() - 4
-            )
+            name = measure.elidedText(self._named(id_), Qt.TextElideMode.ElideRight, named)
+            painter.drawText(QPointF(box.left() + 8, y), name)
+            left = box.left() + named + 16
+            full = QRectF(left, y - measure.ascent() + 3, width - named - 52, measure.ascent() - 4)
             painter.fillRect(full, QColor(theme.RAISED))
             part = QRectF(full)
             part.setWidth(full.width() * min(max(share, 0), 1))
             painter.fillRect(part, colours.get(id_, QColor(theme.FAINT)))
             painter.drawText(QPointF(full.right() + 6, y), f"{share:.0%}")
             y += line
+
+    def _named(self, id_: str) -> str:
+        document = self.session.document
+        return id_ if document is None else row_name(document.grade, id_)
 
     def _draw_legend(self, painter: QPainter) -> None:
         """Say what the matte shows, with its scale from grey to the picture."""
@@ -297,7 +304,7 @@ class ViewerPainter:
             has, lacks = texts.PICK_MATTE, texts.NO_PICK_MATTE
         if shown == DRAFT:
             has = lacks = texts.DRAFT_MATTE
-        words = (has if picture.matte else lacks).format(id=shown)
+        words = (has if picture.matte else lacks).format(id=self._named(shown))
         ends = texts.MATTE_ENDS
         wide = 90.0
         widths = [measure.horizontalAdvance(text) for text in (words, *ends)]
