@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import Qt
 
 from palette4d.studio import grade_steps, texts
+from palette4d.studio.shortcuts import ShortcutsDialog
 
 if TYPE_CHECKING:
     from palette4d.studio.window import Window
@@ -39,6 +40,8 @@ class MenuActions:
             "reset_all": lambda: grade_steps.reset_all(session),
             "add_stop": lambda: window.timeline.add_stop_at_playhead(),
             "lock": lambda: grade_steps.lock(session),
+            "shortcuts": lambda: ShortcutsDialog(window.keys, window).show(),
+            "cross": viewer.cross.switch,
             "act_from": lambda: self._set_range(start=float(session.frame)),
             "act_until": lambda: self._set_range(until=float(session.frame)),
             "ramp_linear": lambda: grade_steps.set_ramp(session, "linear"),
@@ -84,6 +87,8 @@ class MenuActions:
             "ten_back": lambda: self._step(-10),
             "next_handle": lambda: self._to_handle(1),
             "previous_handle": lambda: self._to_handle(-1),
+            "go_to_selected": self.go_to_selected,
+            "reset_layout": window.reset_layout,
             "first_frame": lambda: session.go(window.playback.span()[0]),
             "last_frame": lambda: session.go(window.playback.span()[1]),
             "mark_in": lambda: session.mark(start=session.frame),
@@ -160,6 +165,17 @@ class MenuActions:
         beyond = (frame for frame in frames if (frame - self.session.frame) * way > 0)
         if (frame := next(beyond, None)) is not None:
             self.session.go(frame)
+
+    def go_to_selected(self) -> None:
+        """Go to the frame of the first selected handle, pick or hold."""
+        session, places = self.session, self.window.timeline.places
+        picks = {pick.id: pick for pick, _ in places.lanes()}
+        for id_ in session.selection:
+            found = places.disc(id_) or picks.get(id_)
+            if found is not None:
+                session.go(found.frame)
+                return
+        session.say(texts.SELECT_ONE, "warning")
 
     def handle_frames(self) -> list[int]:
         """Return the frames of vertices and stops, in order."""

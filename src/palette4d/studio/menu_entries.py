@@ -74,6 +74,7 @@ ACTIONS = (
     Action("lock", PALETTE, ("Ctrl+L",)),
     Action("hold_pixel", PALETTE, ("H",)),
     Action("pick_pixel", PALETTE, ("P",)),
+    Action("cross", PALETTE, (".",)),
     Action("act_from", PALETTE, ("Shift+I", "["), group=1),
     Action("act_until", PALETTE, ("Shift+O", "]"), group=1),
     Action("ramp_linear", PALETTE, (), group=2),
@@ -97,6 +98,7 @@ ACTIONS = (
     Action("darker", VIEW, ("Shift+E",), group=3),
     Action("plain_look", VIEW, ("Ctrl+0",), group=3),
     Action("scopes", VIEW, ("Ctrl+Shift+W",), group=4),
+    Action("reset_layout", VIEW, (), group=4),
     Action("full_screen", VIEW, ("F11",), True, 4),
     Action("play", PLAYBACK, ("Space",)),
     Action("play_backwards", PLAYBACK, ("J",)),
@@ -108,6 +110,7 @@ ACTIONS = (
     Action("ten_back", PLAYBACK, ("Shift+Left",), group=1),
     Action("next_handle", PLAYBACK, ("Ctrl+Right",), group=1),
     Action("previous_handle", PLAYBACK, ("Ctrl+Left",), group=1),
+    Action("go_to_selected", PLAYBACK, ("G",), group=1),
     Action("first_frame", PLAYBACK, ("Home",), group=1),
     Action("last_frame", PLAYBACK, ("End",), group=1),
     Action("mark_in", PLAYBACK, ("I",), group=2),
@@ -116,6 +119,7 @@ ACTIONS = (
     Action("loop", PLAYBACK, ("Ctrl+Shift+L",), True, 2),
     Action("first_steps", HELP),
     Action("manual", HELP, ("Ctrl+?",)),
+    Action("shortcuts", HELP),
     Action("about", HELP),
 )
 
@@ -134,7 +138,15 @@ TIMELINE_ACTIONS = (
     _timeline("zoom_in", VIEW, ("+",)),
     _timeline("zoom_out", VIEW, ("-",)),
     _timeline("show_all", VIEW, ("0",)),
+    _timeline("rows_taller", VIEW, ("Alt+Up",)),
+    _timeline("rows_lower", VIEW, ("Alt+Down",)),
 )
+#: Actions whose keys are watched by the views themselves, and cannot be changed.
+FIXED = {
+    "window": ("compare", "cancel"),
+    "timeline": ("next_handle", "previous_handle"),
+    "solid": ("next_colour",),
+}
 SOLID_ACTIONS = (
     _solid("next_colour", PALETTE, ("Tab",)),
     _solid("reset_view", VIEW, ("0",)),

@@ -23,6 +23,7 @@ def view_actions(
             made.setText(f"{action.text}\t{action.keys[0]}")
         else:
             made.setShortcuts([QKeySequence(keys) for keys in action.keys])
+            made.setObjectName(action.name)  # its keys can be changed
         made.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
         made.triggered.connect(lambda _=False, call=calls[action.name]: call())
         view.addAction(made)

@@ -1,6 +1,7 @@
 """Lists below the inspected colour: picks, holds and locks with when they act, and versions."""
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QIcon, QKeyEvent, QPainter, QPixmap
 from PySide6.QtWidgets import (
@@ -21,6 +22,8 @@ from palette4d.plotting import style
 from palette4d.studio import grade_steps, paint, texts, theme
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
+
+U8 = NDArray[np.uint8]
 
 #: The size of the colours before a pick's name.
 ICON = QSize(34, 14)
@@ -116,25 +119,9 @@ class PickList(QWidget):
 
     def _icon(self, pick: Pick) -> QIcon:
         """Return the colour before and after; a hold has a bar across."""
-        ratio = self.devicePixelRatioF()
-        picture = QPixmap(ICON * ratio)
-        picture.setDevicePixelRatio(ratio)
         both = np.array([pick.rgb, pick.rgb if pick.to is None else pick.to])
         before, after = on_screen(self.session, both)
-        painter = QPainter(picture)
-        half = ICON.width() / 2
-        painter.fillRect(QRectF(0, 0, half, ICON.height()), paint.colour_of(before))
-        painter.fillRect(QRectF(half, 0, half, ICON.height()), paint.colour_of(after))
-        painter.setPen(paint.pen(style.RIM, 1.0))
-        painter.drawRect(QRectF(0.5, 0.5, ICON.width() - 1, ICON.height() - 1))
-        if pick.kind == "hold":
-            for colour, width in ((style.INK, 4.0), (style.BRIGHT, 2.0)):
-                painter.setPen(paint.pen(colour, width))
-                painter.drawLine(
-                    QPointF(4, ICON.height() / 2), QPointF(ICON.width() - 4, ICON.height() / 2)
-                )
-        painter.end()
-        return QIcon(picture)
+        return icon_of(self, before, after, hold=pick.kind == "hold")
 
     def _selected(self) -> None:
         if not self._silent:
@@ -157,6 +144,27 @@ class PickList(QWidget):
             self.remove_selected()
             return
         super().keyPressEvent(event)
+
+
+def icon_of(widget: QWidget, before: U8, after: U8, *, hold: bool = False) -> QIcon:
+    """Return a picture of two displayed colours; a hold has a bar across."""
+    ratio = widget.devicePixelRatioF()
+    picture = QPixmap(ICON * ratio)
+    picture.setDevicePixelRatio(ratio)
+    painter = QPainter(picture)
+    half = ICON.width() / 2
+    painter.fillRect(QRectF(0, 0, half, ICON.height()), paint.colour_of(before))
+    painter.fillRect(QRectF(half, 0, half, ICON.height()), paint.colour_of(after))
+    painter.setPen(paint.pen(style.RIM, 1.0))
+    painter.drawRect(QRectF(0.5, 0.5, ICON.width() - 1, ICON.height() - 1))
+    if hold:
+        for colour, width in ((style.INK, 4.0), (style.BRIGHT, 2.0)):
+            painter.setPen(paint.pen(colour, width))
+            painter.drawLine(
+                QPointF(4, ICON.height() / 2), QPointF(ICON.width() - 4, ICON.height() / 2)
+            )
+    painter.end()
+    return QIcon(picture)
 
 
 class Versions(QWidget):

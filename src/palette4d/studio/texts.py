@@ -140,6 +140,7 @@ ACTIONS = {
         "lock": "Lock or unlock the selected",
         "hold_pixel": "Hold the colour under the pointer",
         "pick_pixel": "Pick the colour under the pointer",
+        "cross": "A cross that arrows move over the picture",
         "act_from": "The selected pick acts from here on",
         "act_until": "The selected pick acts until here",
         "ramp_linear": "Ramp: linear",
@@ -163,6 +164,7 @@ ACTIONS = {
         "darker": "Exposure down",
         "plain_look": "Reset exposure and gamma",
         "scopes": "Show or hide the scopes",
+        "reset_layout": "Reset the layout",
         "full_screen": "Full screen",
         "play": "Play or stop",
         "play_backwards": "Play backwards, faster",
@@ -174,6 +176,7 @@ ACTIONS = {
         "ten_back": "Ten frames back",
         "next_handle": "Next frame with a handle",
         "previous_handle": "Previous frame with a handle",
+        "go_to_selected": "Go to the selected handle or pick",
         "first_frame": "First frame",
         "last_frame": "Last frame",
         "mark_in": "In point here",
@@ -182,6 +185,7 @@ ACTIONS = {
         "loop": "Loop",
         "first_steps": "First steps",
         "manual": "Gestures and keys",
+        "shortcuts": "Change the keys…",
         "about": "About palette4d",
     },
     "timeline": {
@@ -195,6 +199,8 @@ ACTIONS = {
         "zoom_in": "Zoom the timeline in",
         "zoom_out": "Zoom the timeline out",
         "show_all": "Show all frames",
+        "rows_taller": "Taller rows",
+        "rows_lower": "Lower rows",
     },
     "solid": {
         "next_colour": "Next colour of the solid",
@@ -218,6 +224,12 @@ GESTURES = (
     ("picture", "Shift-wheel, with a pick selected", "the brush's size"),
     ("picture", "move the pointer", "see the pixel's values, and its weights on the rows"),
     ("picture", "wheel", "zoom at the pointer"),
+    (
+        "picture",
+        "Enter or ., then arrows",
+        "move a cross over the picture; Ctrl is finer, Shift farther",
+    ),
+    ("picture", "Enter or Ctrl-Enter at the cross", "pick or hold there; Esc hides the cross"),
     ("picture", "middle button; Shift-drag without a pick", "pan"),
     ("picture", "drag the wipe's line", "move the wipe"),
     ("timeline", "click a disc or a row", "select it; Shift or Ctrl adds"),
@@ -237,6 +249,7 @@ GESTURES = (
     ("timeline", "click or drag in the ruler or the strip", "move the playhead"),
     ("timeline", "wheel over the ruler, Ctrl-wheel", "zoom at the pointer"),
     ("timeline", "Shift-wheel, middle button", "pan"),
+    ("timeline", "Alt-wheel", "make the rows taller or lower"),
     ("solid", "drag the ground", "turn the solid"),
     ("solid", "drag a colour", "move it in the plane of the screen"),
     ("solid", "X, Y or Z while dragging", "move along red, green or blue only"),
@@ -263,6 +276,7 @@ CLOSE_ANYWAY = "{why}\n\nSave elsewhere, or close and discard the edits?"
 RESET_ALL = "everything is reset"
 WAS_LOCKED, WAS_UNLOCKED = "locked {ids}", "unlocked {ids}"
 SELECT_A_HANDLE = "select a vertex or a stop first"
+SELECT_ONE = "select a handle, a pick or a hold first"
 SELECT_A_PICK = "select a pick or a hold first"
 POINT_AT = "point at a pixel first"
 KEPT_VERSION = "kept as version {name}"
@@ -413,6 +427,12 @@ FIRST_STEPS_TEXT = (
 MANUAL = "Gestures and keys"
 MANUAL_COLUMNS = ("where", "do this", "and")
 SEARCH = "Search"
+SHORTCUTS = "Keys"
+SHORTCUT_COLUMNS = ("menu", "action", "keys")
+SEARCH_KEYS = "Search an action or a key"
+KEYS = "Keys of the selected action"
+KEY_TAKEN = "{key} is taken from “{name}” then"
+RESET_KEYS = "Reset all keys"
 IN_TIMELINE, IN_SOLID = "(in the timeline)", "(in the solid)"
 USE_A_VERSION = "Use a version"
 ABOUT = "palette4d {version}\nTime-varying palettes for colour grading\n(Du et al., SIGGRAPH 2021)"
@@ -434,6 +454,7 @@ FADE_SET = "{id} fades over {frames} frames before and after its range"
 SAME_EVERYWHERE = "{id} becomes the same colour in all frames"
 SAME_SHIFT = "{id} shifts by the same offset in all frames"
 RESET = "Reset the selected handles"
+AT_FRAME = "frame {frame}"
 GO_THERE = "Go to frame {frame}"
 ROW_TIP = "double-click adds a stop"
 STOP_ADDED = "added a stop to {row} at frame {frame}"

@@ -28,6 +28,8 @@ Shapes = tuple[F64, tuple[QPolygonF, ...], QPolygonF, list[QPolygonF]]
 COLUMN = 2
 #: The same while something is dragged.
 DRAGGED_COLUMN = 8
+#: From this height of half a row on, the area of a ramp is filled; its colour.
+TALL_RAMP, RAMP_AREA = 8.0, QColor(0, 0, 0, 70)
 #: The ground of rows with something selected.
 CHOSEN = QColor(255, 255, 255, 26)
 
@@ -48,6 +50,7 @@ class TimelinePainter:
         """Draw nothing yet."""
         self.view, self.session, self.places, self.strip = view, session, places, strip
         self.box: QRectF | None = None  #: the box of a selection
+        self.told: tuple[QPointF, str] | None = None  #: what is said beside the pointer
         self._picture: tuple[object, tuple[QPixmap, QPixmap]] | None = None
         self._shapes: tuple[object, dict[int, Shapes]] | None = None
 
@@ -209,6 +212,12 @@ class TimelinePainter:
         rim = np.interp(x, lower[:, 0], lower[:, 1])
         curve = np.stack([x, seam + (rim - seam) * (0.12 + 0.76 * moved / most)], axis=-1)
         shape = paint.polygon(curve)
+        if float(np.max(rim - seam)) > TALL_RAMP:  # the area tells how much of the edit acts
+            area = np.concatenate([curve, np.stack([x, seam], axis=-1)[::-1]])
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(RAMP_AREA)
+            painter.drawPolygon(paint.polygon(area))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.setPen(paint.pen(style.INK, 2.2))
         painter.drawPolyline(shape)
         painter.setPen(paint.pen(style.BRIGHT, 1.0))
@@ -415,6 +424,13 @@ class TimelinePainter:
                 for side in half_bands(layout.paths[edge][1] + [0, top], BAND * layout.row_height):
                     painter.drawPolyline(paint.polygon(side))
             painter.setClipping(False)
+        if self.told is not None:
+            at, text = self.told
+            painter.setFont(paint.small_font(self.view, bold=True))
+            wide = painter.fontMetrics().horizontalAdvance(text) / 2 + 4
+            x = min(max(at.x(), GUTTER + wide), self.places.width - wide)
+            y = max(at.y() - 18, RULER + STRIP + 8.0)
+            paint.label(painter, x, y, text, style.BRIGHT, style.INK)
         if self.box is not None:
             painter.setPen(paint.pen(style.BRIGHT, 1.0, [3, 3]))
             painter.setBrush(QColor(255, 255, 255, 18))

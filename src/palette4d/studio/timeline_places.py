@@ -28,6 +28,8 @@ LOW_HEAD = 13.0
 #: The heights of a row, and the largest radius of a disc, in rows. In the lowest row there is space
 #: for the name of a disc.
 LOWEST, HIGHEST, RADIUS = 24.0, 46.0, 0.27
+#: How many times as high rows can be made on demand.
+TALLEST = 6.0
 #: The fewest frames that fill the width.
 CLOSEST = 4.0
 
@@ -70,6 +72,8 @@ class Places:
         The frames that the width shows; None: the clip.
     scroll : float
         Pixels that the rows are scrolled by.
+    tall : float
+        Rows are so many times as high as the room asks for.
     dragged : (str, float, float, float) or None
         A pick whose range is being dragged: start, until and fade.
     """
@@ -80,6 +84,7 @@ class Places:
         self.revision = session.revision
         self.zoomed: tuple[float, float] | None = None
         self.scroll = 0.0
+        self.tall = 1.0
         self.dragged: tuple[str, float, float, float] | None = None
         self._palette: tuple[object, PlottedPalette, Rows] | None = None
         self._layout: tuple[object, Timeline, list[Disc]] | None = None
@@ -148,11 +153,12 @@ class Places:
         if palette is None or self._palette is None:
             return None
         rows = self._palette[2]
-        height = float(np.clip(self.room / max(rows.count, 1), LOWEST, HIGHEST))
+        usual = float(np.clip(self.room / max(rows.count, 1), LOWEST, HIGHEST))
+        height = usual * self.tall
         scale = self.scale
         key = (self._palette[0], scale, height)
         if self._layout is None or self._layout[0] != key:
-            layout = Timeline(palette, rows, scale, height, RADIUS)
+            layout = Timeline(palette, rows, scale, height, RADIUS / self.tall)
             old = None if self._layout is None else self._layout[1]
             if (
                 old is not None
@@ -311,6 +317,12 @@ class Places:
     def show_all(self) -> None:
         """Show the whole clip."""
         self.zoomed = None
+
+    def make_taller(self, factor: float) -> None:
+        """Make rows so many times as high; the row in the middle stays there."""
+        before, middle = self.tall, self.scroll + self.room / 2
+        self.tall = min(max(self.tall * factor, 1.0), TALLEST)
+        self.scroll = middle * self.tall / before - self.room / 2
 
     # ------------------------------------------------------------------------------------ handles
 

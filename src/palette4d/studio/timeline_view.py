@@ -42,8 +42,8 @@ from palette4d.studio.timeline_places import (
     Places,
 )
 
-#: A step of the zoom.
-ZOOM = 0.6
+#: A step of the zoom, and of the rows' height.
+ZOOM, TALLER = 0.6, 1.4
 #: With one of these a range's end changes the fade; many desktops keep Alt for themselves.
 FADE_KEYS = Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.ControlModifier
 #: Pixels that the pointer moves before a press becomes a drag.
@@ -99,6 +99,8 @@ class TimelineView(QWidget):
                 "stop_later": lambda: self.nudge(1),
                 "select_all": self.select_all,
                 "show_all": self.show_all,
+                "rows_taller": lambda: self.make_taller(TALLER),
+                "rows_lower": lambda: self.make_taller(1 / TALLER),
             },
         )
         calls: tuple[tuple[Event, Callable[[], object]], ...] = (
@@ -182,14 +184,24 @@ class TimelineView(QWidget):
         self.places.show_all()
         self.update()
 
+    def make_taller(self, factor: float) -> None:
+        """Make rows so many times as high: their colours and ramps are seen better."""
+        self.places.make_taller(factor)
+        self.update()
+
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Zoom over the ruler or with Ctrl, pan with Shift, else scroll the rows."""
+        """Zoom over the ruler or with Ctrl, pan with Shift, else scroll the rows.
+
+        With Alt, make rows taller or lower.
+        """
         turn = event.angleDelta()
         steps, sideways = turn.y() / 120, turn.x() / 120
         keys, at = event.modifiers(), event.position()
         start, end = self.places.span
         zooms = keys & Qt.KeyboardModifier.ControlModifier or at.y() < RULER + STRIP
-        if keys & Qt.KeyboardModifier.ShiftModifier or sideways:
+        if keys & Qt.KeyboardModifier.AltModifier:  # some systems turn the wheel sideways then
+            self.make_taller(TALLER ** ((steps + sideways) / 2))
+        elif keys & Qt.KeyboardModifier.ShiftModifier or sideways:
             self.places.show(start - (steps + sideways) * 0.1 * (end - start), end - start)
         elif zooms or not self.places.hidden:
             self.zoom(0.85**steps, at.x())
@@ -282,7 +294,15 @@ class TimelineView(QWidget):
     def _drag_stop(self, id_: str, x: float, *, snap: bool) -> None:
         frame = self.places.place_for(id_, self.places.frame_at(x, snap=snap))
         if frame is not None:
+            self._tell(x, frame)
             grade_steps.move_stop(self.session, id_, frame, dragging=True)
+
+    def _tell(self, x: float, frame: float) -> None:
+        """Say a frame's number beside the pointer."""
+        press = self._press
+        if press is not None:
+            text = texts.AT_FRAME.format(frame=style.number(frame))
+            self.painter.told = QPointF(x, press.at.y()), text
 
     def _drag_range(self, hit: Hit, x: float, *, fade: bool) -> None:
         """Drag an end of a range, or of its fades."""
@@ -299,8 +319,19 @@ class TimelineView(QWidget):
             start = min(frame, until)
         else:
             until = max(frame, start)
+        self._tell_range(hit.grip, x, (start, until, wide), frame)
         self.places.dragged = (hit.id, start, until, wide)
         self.update()
+
+    def _tell_range(
+        self, grip: str, x: float, ends: tuple[float, float, float], frame: float
+    ) -> None:
+        """Say what the end of a range becomes, or how long its fades are."""
+        start, until, wide = ends
+        self._tell(x, start if grip in ("start", "fade in") else until)
+        if self.painter.told is not None and (grip.startswith("fade") or frame not in ends[:2]):
+            text = texts.FADE_OF.format(frames=style.number(wide))
+            self.painter.told = self.painter.told[0], text
 
     def _keep_range(self) -> None:
         """Give the pick the range or the fade that was dragged."""
@@ -332,6 +363,7 @@ class TimelineView(QWidget):
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """End a drag."""
         press, self._press, self.painter.box = self._press, None, None
+        self.painter.told = None
         if press is not None and press.hit.grip and press.moved:
             self._keep_range()
         if press is not None and press.hit.stop and press.moved:
@@ -428,6 +460,7 @@ class TimelineView(QWidget):
         made = self.session.edit(lambda document: document.stop(edge, frame=frame, rgb=rgb), text)
         if made is not None:
             self.session.select(made)
+            self.session.go(frame)  # the picture shows what its colour does
 
     def add_stop_at_playhead(self) -> None:
         """Add a stop to the selected row at the playhead."""

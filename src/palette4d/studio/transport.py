@@ -198,7 +198,7 @@ class Transport(QWidget):
             button = QToolButton()
             button.setProperty("flat", True)
             button.setIconSize(QSize(16, 16))
-            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+            button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
             button.setIcon(icon(name))
             self.buttons[name] = button
             row.addWidget(button)
@@ -223,14 +223,14 @@ class Transport(QWidget):
             button = QToolButton()
             button.setText(text)
             button.setCheckable(True)
-            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+            button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
             button.clicked.connect(lambda _=False, key=key: session.look(compare=key))
             group.addButton(button)
             self.compare[key] = button
             row.addWidget(button)
         looks.addSpacing(6)
         self.look = Choice()
-        self.look.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.look.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.look.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )

@@ -24,6 +24,7 @@ from palette4d.studio.player import Region
 from palette4d.studio.preview import NO_PIXELS, Grade, Picture, Preview, Request
 from palette4d.studio.session import Session
 from palette4d.studio.states import Place
+from palette4d.studio.viewer_cross import Cross
 from palette4d.studio.viewer_paint import ViewerPainter, hatched, image_of
 
 #: Pixels of the screen within which the pointer takes the wipe's line, and a press is a click.
@@ -53,6 +54,7 @@ class Viewer(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setAccessibleName(texts.VIEWER)
+        self.cross = Cross(self)
         self.painter = ViewerPainter(self)
         self.preview = Preview(lambda picture: session.post(lambda: self._arrived(picture)))
         self.zoom: float | None = None  #: pixels of the screen for one of the frame; None: fitted
@@ -392,6 +394,7 @@ class Viewer(QWidget):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Go on with what the button does; else probe."""
         point = self.pointer = event.position()
+        self.cross.hide_for_pointer()
         if self.doing == "pan" and self.press is not None:
             if self.zoom is None:
                 self.zoom = self.scale() * self.devicePixelRatioF()
@@ -465,6 +468,7 @@ class Viewer(QWidget):
         """Stop probing."""
         self.pointer, self.shows_brush = None, False
         self.session.show_probe(None)
+        self.cross.show()
         self.update()
 
     def wheelEvent(self, event: QWheelEvent) -> None:
@@ -480,8 +484,29 @@ class Viewer(QWidget):
             self.zoom_by(ZOOM_STEP**turns, event.position())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Pass every key on: the menus have them."""
-        event.ignore()
+        """Move the cross; pass every other key on: the menus have them."""
+        enters = event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+        if self.cross.takes(event):
+            if enters and self.cross.at is None:
+                self.cross.switch()
+            else:
+                self.cross.press(event)
+        else:
+            event.ignore()
+
+    def event(self, event: QEvent) -> bool:
+        """Have the keys of the cross before the menus while it is seen."""
+        override = event.type() == QEvent.Type.ShortcutOverride
+        if override and isinstance(event, QKeyEvent) and self.cross.takes(event):
+            event.accept()
+            return True
+        return super().event(event)
+
+    def point_at(self, point: QPointF) -> None:
+        """Probe a point, as if the pointer were there."""
+        self.pointer = point
+        self._probe(point)
+        self.update()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Ask for a picture of the new size."""

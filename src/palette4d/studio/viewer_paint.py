@@ -69,6 +69,7 @@ class ViewerPainter:
         self._draw_captions(painter)
         self._draw_marks(painter)
         self._draw_brush(painter)
+        self.viewer.cross.paint(painter)
         if (
             self.viewer.doing == "box"
             and self.viewer.press is not None

@@ -28,7 +28,9 @@ from PySide6.QtGui import (
     QMouseEvent,
 )
 from PySide6.QtWidgets import (
+    QAbstractButton,
     QAbstractSpinBox,
+    QComboBox,
     QDockWidget,
     QLabel,
     QLineEdit,
@@ -51,6 +53,7 @@ from palette4d.studio.menu_entries import ACTIONS, Action
 from palette4d.studio.paths import sequence_of
 from palette4d.studio.scopes_view import Scopes
 from palette4d.studio.session import Session
+from palette4d.studio.shortcuts import Shortcuts
 from palette4d.studio.shot_list import Shots
 from palette4d.studio.solid_view import SolidView
 from palette4d.studio.start_page import StartPage
@@ -205,6 +208,7 @@ class Window(QMainWindow):
         QVBoxLayout(self.viewer).addWidget(self.start)
         self.actions_by_name: dict[str, QAction] = {}
         self._make_menus()
+        self.keys = Shortcuts(self.settings, self._entry)
         for name in ("first_frame", "previous_frame", "play", "next_frame", "last_frame"):
             button = self.transport.buttons[name]
             button.clicked.connect(functools.partial(self._do, name))
@@ -216,6 +220,7 @@ class Window(QMainWindow):
         session.on("selection", self._bring_inspector)
         self._closing = False  # when no edit reads the clip any more
         session.on("followed", self._close_if_followed)
+        self._first_state = self.saveState()
         self._listener = Listener(self, self._asked_for)
         session.on("document", lambda: self._listener.listen(session.path))
         session.on("document", lambda: self.files.mark_open(session.path))
@@ -270,6 +275,16 @@ class Window(QMainWindow):
         if field.hasFocus():  # by Enter, not because the keyboard went elsewhere
             self.viewer.setFocus()
 
+    def event(self, event: QEvent) -> bool:
+        """Leave the space bar to a button that has the keyboard: else it plays."""
+        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent):
+            plain = event.modifiers() == Qt.KeyboardModifier.NoModifier
+            button = isinstance(self.focusWidget(), QAbstractButton | QComboBox)
+            if event.key() == Qt.Key.Key_Space and plain and button:
+                event.accept()
+                return True
+        return super().event(event)
+
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Leave undo and redo to the document, unless text was typed that is not entered yet."""
         if (
@@ -283,6 +298,13 @@ class Window(QMainWindow):
                 event.ignore()
                 return True
         return super().eventFilter(watched, event)
+
+    def reset_layout(self) -> None:
+        """Give the panels their first places and sizes; the shots stay as they are."""
+        shots = self.docks["shots"].isVisible()
+        self.restoreState(self._first_state)
+        self.arrange()
+        self.docks["shots"].setVisible(shots)
 
     def show_or_hide(self, panel: str) -> None:
         """Show a panel above those that it lies below; hide it if it is seen."""
@@ -390,6 +412,15 @@ class Window(QMainWindow):
         made.triggered.connect(functools.partial(self._do, action.name))
         self.actions_by_name[action.name] = made
         return made
+
+    def _entry(self, action: Action) -> QAction:
+        """Return the menus' entry of an action, of the window or of a panel."""
+        if action.view == "window":
+            return self.actions_by_name[action.name]
+        panel = self.timeline if action.view == "timeline" else self.solid
+        found = panel.findChild(QAction, action.name)
+        assert isinstance(found, QAction)
+        return found
 
     def action(self, name: str) -> Callable[[], object]:
         """Return what does an action: a call of the menus, or a method of its name."""

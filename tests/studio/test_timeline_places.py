@@ -1,0 +1,38 @@
+"""The timeline's rows and handles in a window: their height, and the playhead at them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from palette4d.studio.window import Window
+
+
+def test_rows_are_made_taller_and_lower(opened: Window) -> None:
+    timeline = opened.timeline
+    before = timeline.places.timeline
+    assert before is not None
+    for _ in range(3):
+        next(a for a in timeline.actions() if a.objectName() == "rows_taller").trigger()
+    after = timeline.places.timeline
+    assert after is not None
+    assert after[0].row_height > 2.5 * before[0].row_height
+    most = max(disc.radius for disc in after[1])
+    assert most <= max(disc.radius for disc in before[1]) + 0.5
+    for _ in range(9):
+        next(a for a in timeline.actions() if a.objectName() == "rows_lower").trigger()
+    last = timeline.places.timeline
+    assert last is not None
+    assert last[0].row_height == before[0].row_height
+
+
+def test_a_new_stop_has_the_playhead(opened: Window) -> None:
+    content = opened.timeline.places.content
+    assert content is not None
+    edge = next(k for k, ends in enumerate(content.edges) if np.ptp(content.frames[list(ends)]) > 4)
+    start, end = sorted(content.frames[list(content.edges[edge])].tolist())
+    frame = round(start) + 2 if round(start) + 2 != opened.session.frame else round(start) + 3
+    opened.timeline.add_stop(content.edge_ids[edge], float(frame))
+    assert start < opened.session.frame == frame < end
+    opened.session.go(12)
+    opened._do("go_to_selected")
+    assert opened.session.frame == frame
