@@ -9,7 +9,7 @@ import pytest
 
 from palette4d.colour.encoding_conversion import between
 from palette4d.common.errors import Palette4dError
-from palette4d.grade import sidecar
+from palette4d.grade import reanalysis, sidecar
 from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.copying import Fit
 from palette4d.grade.document import Document
@@ -199,6 +199,25 @@ def test_a_new_analysis_with_another_palette_gets_the_grade(tmp_path: Path) -> N
     again = Document(members("split"))
     again.save(path, on_edits="keep")
     assert (tmp_path / "clip.former2.p4d.json").exists()
+
+
+def test_a_new_analysis_does_not_replace_what_another_program_writes_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "clip.p4d.json"
+    graded().save(path)
+    copied = reanalysis.copied
+
+    def slowly(*given: Any) -> Any:
+        path.write_bytes(path.read_bytes() + b"\n")  # without the lock
+        return copied(*given)
+
+    monkeypatch.setattr(reanalysis, "copied", slowly)
+    fields = members("merge")
+    fields["edits"] = {"vertices": [], "stops": []}
+    with pytest.raises(Palette4dError, match="another program"):
+        Document(fields).save(path, on_edits="keep")
+    assert path.read_bytes().endswith(b"\n\n")
 
 
 def test_edits_stay_with_the_same_handles(tmp_path: Path) -> None:

@@ -179,3 +179,19 @@ def test_a_colour_that_comes_back_is_there_again() -> None:
     path = follow.paths(clip, [(2, (0.8, 0.15, 0.1))], (0, 39))
     there = np.interp([2, 20, 38], [key.frame for key in path], [key.there for key in path])
     assert there.tolist() == [1, 0, 1]
+
+
+def test_what_has_become_another_thing_does_not_come_back_by_its_size() -> None:
+    rng = np.random.default_rng(5)
+    start, end = np.array([0.8, 0.2, 0.15]), np.array([0.25, 0.06, 0.05])
+    frames = np.empty((45, 60, 100, 3), np.float32)
+    for i in range(45):
+        part = min(i, 29) / 29
+        frames[i] = [0.35, 0.5, 0.6]
+        size = 10 + 12 * min(i, 29) // 29 if i < 30 else max(10, 22 - 3 * (i - 29))
+        frames[i, 20 : 20 + size, 30 : 30 + size] = start + (end - start) * part
+    frames += 0.01 * rng.normal(size=frames.shape).astype(np.float32)
+    path = follow.paths(ArrayClip(frames), [(0, (0.8, 0.2, 0.15))], (0, 44))
+    there = np.interp(range(45), [key.frame for key in path], [key.there for key in path])
+    assert there[0] == 1
+    assert there[29:].max() == 0
