@@ -34,10 +34,13 @@ from palette4d.lut_export.spaces import PALETTE
 
 from palette4d import _core
 from palette4d.colour.ocio_config import BUILT_IN, failures
+from palette4d.common import sandbox
+from palette4d.common.child import Child
 from palette4d.common.errors import Arg, Palette4dError
 from palette4d.common.files import make_folder, refuse_existing, replace_by_link, replacing
 from palette4d.common.text import checked_name, counted, file_safe
 from palette4d.jobs.workers import Workers
+from palette4d.media.clip_files import files_of_sidecar
 
 #: The value of FRAME if the host does not set it; a file of that name exists.
 NO_FRAME = "default"
@@ -127,10 +130,7 @@ def write_config(
     if not force:
         refuse_looks(config, base, [ANY_SHOT, *shot_names])
     frames = [choose(sidecar) for sidecar in read]
-    between = [
-        between_error(file, sidecar, baked, settings.strength, clip)
-        for file, sidecar, baked in zip(sidecars, read, frames, strict=True)
-    ]
+    between = _between(sidecars, frames, settings.strength, clip)
     if not anyway:
         _refuse_far(shot_names, between)
 
@@ -205,6 +205,20 @@ def _refuse_failed(names: list[str], baked: list[series.Series]) -> None:
             "not all frames could be baked; no config was written, and the same command tries "
             "only these again:\n" + "\n".join(failed)
         )
+
+
+def _between(
+    sidecars: list[Path], frames: list[tuple[int, ...]], strength: float, clip: str | None
+) -> list[BetweenError | None]:
+    """Return the errors between the frames of each sidecar; a command's child reads its clip."""
+    found = []
+    for file, baked in zip(sidecars, frames, strict=True):
+        if sandbox.of_command():
+            with Child(reads=files_of_sidecar(file, clip)) as child:
+                found.append(child.call(between_error, file, baked, strength, clip))
+        else:
+            found.append(between_error(file, baked, strength, clip))
+    return found
 
 
 def _refuse_far(names: list[str], between: list[BetweenError | None]) -> None:

@@ -52,7 +52,6 @@ def nearest(baked: tuple[int, ...], frame: int) -> int:
 
 def between_error(
     path: Path,
-    sidecar: _core.Sidecar,
     baked: tuple[int, ...],
     strength: float = 1.0,
     clip: str | None = None,
@@ -62,6 +61,7 @@ def between_error(
     `baked` are the frames that have a look, in rising order. Without `clip` the sidecar's clip is
     used.
     """
+    sidecar = _core.read_sidecar(str(path))
     own = set(baked)
     between = [frame for frame in series.every(sidecar, 1) if frame not in own]
     if not between:

@@ -10,6 +10,7 @@ Other processes or machines bake the frames. Only this process writes in the fol
 import hashlib
 import itertools
 import math
+import os
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -33,12 +34,13 @@ from palette4d.lut_export.series_index import (
 )
 
 from palette4d import _core
-from palette4d.colour.ocio_config import from_anywhere
+from palette4d.colour.ocio_config import files_of_config, from_anywhere
 from palette4d.common.arguments import frames_between
 from palette4d.common.errors import Arg, Palette4dError, WriteError
 from palette4d.common.files import make_folder, replacing, temporary_folder
 from palette4d.common.text import checked_name, file_safe
 from palette4d.jobs.workers import Failed, Workers
+from palette4d.media.clip_files import files_of_sidecar
 
 #: Seconds between two updates of the index file while frames are baked.
 INDEX_EVERY = 2.0
@@ -261,7 +263,7 @@ def export(
     tasks = {(i, f): task for i, one in enumerate(exports) for f, task in one.tasks.items()}
     try:
         try:
-            (workers or Workers()).run(bake_frame, tasks, take)
+            (workers or Workers()).run(bake_frame, tasks, take, reads=_files(requests))
         finally:
             for one in exports:
                 one.finish()
@@ -270,6 +272,15 @@ def export(
             f"{error}; the files that are there are whole, and the same command goes on from them"
         ) from error
     return [one.series() for one in exports]
+
+
+def _files(requests: Sequence[Request]) -> list[Path]:
+    """Return what the processes that bake must read."""
+    found: list[Path] = []
+    for one in requests:
+        found += files_of_sidecar(one.sidecar, one.clip)
+        found += files_of_config(one.settings.ocio_config or os.environ.get("OCIO") or "")
+    return list(dict.fromkeys(found))
 
 
 class _Export:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 
 from palette4d._core import __version__
 from palette4d.cli import job
+from palette4d.cli.confined import confined
 from palette4d.cli.terminal import printable_output, tell
 from palette4d.common.arguments import Parser, accept_negative_values
 from palette4d.common.errors import Palette4dError, SidecarError, in_words
@@ -44,6 +45,8 @@ example:
 
 `palette4d VERB --help` explains a verb and shows an example.
 `palette4d VERB --progress FILE` is for programs that wait: progress as JSON lines (docs/files.md).
+`palette4d VERB --sandbox on|off`: clips are decoded by a confined process, or by none (SECURITY.md;
+default: where the kernel allows it).
 """
 
 
@@ -63,6 +66,9 @@ def build_parser(verb: str = "") -> argparse.ArgumentParser:
         importlib.import_module(name).add_parser(subparsers)
     for each in subparsers.choices.values():
         each.add_argument("--progress", metavar="FILE", help=argparse.SUPPRESS)
+        each.add_argument(
+            "--sandbox", choices=("auto", "on", "off"), default="auto", help=argparse.SUPPRESS
+        )
     accept_negative_values(subparsers)
     return parser
 
@@ -77,19 +83,25 @@ def main(argv: Sequence[str] | None = None) -> int:
     SystemExit
         From argparse: wrong usage (2), ``--help`` and ``--version`` (0).
     """
-    # All loops run in threads of palette4d's own. Those of OpenBLAS would only spin beside them.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # All loops run in threads of palette4d's own. Those of OpenBLAS would only spin beside them,
+    # and would not be confined.
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     if sys.platform == "win32":  # what Studio sends in the place of Ctrl-C
         signal.signal(signal.SIGBREAK, signal.default_int_handler)
     given = sys.argv[1:] if argv is None else argv
     with printable_output(), contextlib.ExitStack() as stack:
-        return _run(build_parser(*given[:1]).parse_args(given), stack)
+        args = build_parser(*given[:1]).parse_args(given)
+        # Not for a Python program that calls this: its process would stay confined.
+        args.confine = argv is None
+        return _run(args, stack)
 
 
 def _run(args: argparse.Namespace, stack: contextlib.ExitStack) -> int:
     run: Callable[[argparse.Namespace], int] = args.run
     try:
         stack.enter_context(job.events_to(args.progress))
+        if args.confine:
+            stack.enter_context(confined(args))
         status = run(args)
         sys.stdout.flush()
         if status == 0:

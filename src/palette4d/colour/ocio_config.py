@@ -1,6 +1,7 @@
 """OpenColorIO configs and the names in them; errors suggest similar names."""
 
 import atexit
+import contextlib
 import difflib
 import functools
 import os
@@ -8,10 +9,33 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from palette4d.common import sandbox
 from palette4d.common.errors import Arg, Palette4dError
 
 #: OpenColorIO's oldest config with camera encodings: every host with 2.1 or later reads it.
 BUILT_IN = "ocio://studio-config-v1.0.0_aces-v1.3_ocio-v2.1"
+
+#: Extensions of the files that a config names.
+_LUTS = frozenset(
+    {
+        *(
+            "3dl",
+            "cc",
+            "ccc",
+            "cdl",
+            "clf",
+            "csp",
+            "ctf",
+            "cub",
+            "cube",
+            "hdl",
+            "icc",
+            "icm",
+            "itx",
+        ),
+        *("look", "lut", "m3d", "mga", "ocio", "spi1d", "spi3d", "spimtx", "vf"),
+    }
+)
 
 #: The names of one encoding in files and in OpenColorIO configs of different years.
 SAME_ENCODINGS = (
@@ -103,6 +127,22 @@ def load_config(name: str, option: str) -> Any:
 def from_anywhere(name: str | None) -> str | None:
     """Return a config's absolute path; None, "" and names that are not files stay the same."""
     return str(Path(name).absolute()) if name and Path(name).is_file() else name
+
+
+def files_of_config(name: str) -> list[Path]:
+    """Return the files and folders that are read with a config: its own, and where its LUTs are."""
+    if not Path(name).is_file():
+        return []
+    folder = Path(name).absolute().parent
+    found = [Path(name), *sandbox.parts(folder, _LUTS)]
+    with contextlib.suppress(*failures()):
+        import PyOpenColorIO as ocio
+
+        config = ocio.Config.CreateFromFile(name)
+        context = config.getCurrentContext()
+        for path in config.getSearchPaths():
+            found += sandbox.parts(folder / context.resolveStringVar(path), _LUTS)
+    return found
 
 
 def chosen_config(given: str | None) -> tuple[Any, str]:

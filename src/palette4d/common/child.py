@@ -1,6 +1,6 @@
 """A child process with limits, for files that may crash or exhaust the library that reads them.
 
-It is no sandbox: a file that takes over the child has the user's rights.
+It may be confined: then a file that takes it over reads what was named, and no more.
 """
 
 from __future__ import annotations
@@ -11,14 +11,17 @@ import os
 import pickle
 import signal
 import sys
+import tempfile
 import types
 from collections.abc import Callable, Iterable, Iterator
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnContext
+from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
 
+from palette4d.common import files, sandbox
 from palette4d.common.errors import Palette4dError, in_words
 
 Result = TypeVar("Result")
@@ -40,10 +43,20 @@ class Child:
         The longest time for a call.
     megabytes : int, optional
         The most memory for all calls, where the system can limit it.
+    reads : iterable of Path, optional
+        The process is confined (`sandbox`), if that is wanted: it reads these, and writes into a
+        folder for temporary files alone.
     """
 
-    def __init__(self, seconds: float | None = None, megabytes: int | None = None) -> None:
+    def __init__(
+        self,
+        seconds: float | None = None,
+        megabytes: int | None = None,
+        reads: Iterable[Path] | None = None,
+    ) -> None:
         self.seconds, self.megabytes = seconds, megabytes
+        self._reads = None if reads is None or not sandbox.wanted() else list(reads)
+        self._temporary = contextlib.ExitStack()
         self._process: Any = None
         self._pipe: Connection | None = None
 
@@ -123,6 +136,7 @@ class Child:
         if self._pipe is not None:
             self._pipe.close()
         self._process = self._pipe = None
+        self._temporary.close()
 
     def _start(self) -> None:
         # Spawned, not forked: the libraries run threads, which a fork would break.
@@ -136,7 +150,11 @@ class Child:
     def _spawn(self, context: SpawnContext) -> None:
         with _without_interrupts(), _without_main():
             self._pipe, theirs = context.Pipe()
-            arguments = (theirs, self.seconds, self.megabytes)
+            confined = None
+            if self._reads is not None:
+                folder = files.temporary_folder(Path(tempfile.gettempdir()))
+                confined = self._reads, self._temporary.enter_context(folder)
+            arguments = (theirs, self.seconds, self.megabytes, confined)
             self._process = context.Process(target=_serve, args=arguments, daemon=True)
             self._process.start()
             theirs.close()
@@ -189,8 +207,17 @@ def _without_main() -> Iterator[None]:
         sys.modules["__main__"] = main
 
 
-def _serve(pipe: Connection, seconds: float | None, megabytes: int | None) -> None:
+def _serve(
+    pipe: Connection,
+    seconds: float | None,
+    megabytes: int | None,
+    confined: tuple[list[Path], Path] | None,
+) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
+    if confined is not None:
+        reads, folder = confined
+        tempfile.tempdir = str(folder)
+        sandbox.confine(reads, [folder])
     if megabytes is not None:
         _limit(megabytes)
     while True:

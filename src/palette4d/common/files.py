@@ -12,6 +12,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 
+from palette4d.common import locking
 from palette4d.common.errors import Arg, Palette4dError, WriteError
 from palette4d.common.locking import remove_left_over
 
@@ -50,11 +51,14 @@ def refuse_existing(path: Path, force: bool, made: Path | None = None) -> None:
             "from the others; expected a file of its own. Write to another name, or make it a copy"
         )
     if not os.access(path.parent, os.W_OK):
-        raise _closed(path)
+        raise closed(path)
 
 
 def make_folder(folder: Path) -> None:
     """Make a folder and its parents."""
+    if locking.delegate is not None:
+        locking.delegate.ask("make_folder", os.fspath(folder.absolute()))
+        return
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -118,13 +122,17 @@ def replacing(
     force : replace a file that exists.
     check : called immediately before the rename; if it raises, `path` is unchanged.
     """
+    if locking.delegate is not None:
+        with locking.delegate.replacing(path, force=force, check=check) as elsewhere:
+            yield elsewhere
+        return
     path = link_target(path)
     refuse_existing(path, force)
     _remove_leftovers(path.parent)
     try:
         temporary, lock = _new_temporary(path)
     except OSError as error:
-        raise _closed(path, f": {error.strerror}") from error
+        raise closed(path, f": {error.strerror}") from error
     try:
         yield temporary
         if temporary.is_symlink():
@@ -344,7 +352,8 @@ def _sync_folder(folder: Path) -> None:
             os.close(handle)
 
 
-def _closed(path: Path, why: str = "") -> WriteError:
+def closed(path: Path, why: str = "") -> WriteError:
+    """Return the error for a file whose folder cannot be written to."""
     return WriteError(
         f"{path}: cannot write in {path.parent}{why}; choose another folder, or change its "
         "permissions"

@@ -15,9 +15,13 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 from palette4d.common.errors import Palette4dError
 from palette4d.common.json_files import UnusableFile, read_regular
+
+#: Locks and writes for this process, where it is confined (`common.writer`).
+delegate: Any = None
 
 #: Seconds to wait while another program holds the lock.
 LOCK_SECONDS = 10.0
@@ -35,6 +39,10 @@ def locked(target: Path) -> Iterator[Callable[[], None]]:
     """Hold the lock of a file; yield a check that raises if the lock was lost."""
     if not target.parent.is_dir():
         yield lambda: None  # the write reports the error
+        return
+    if delegate is not None:
+        with delegate.locked(target) as held_there:
+            yield held_there
         return
     deadline = time.monotonic() + LOCK_SECONDS
     path = target.with_name(f".{target.name[:200]}.lock")

@@ -8,8 +8,10 @@ import traceback
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeVar
 
+from palette4d.common import sandbox
 from palette4d.common.child import Child, ChildError, done
 from palette4d.common.errors import Palette4dError, in_words
 
@@ -39,6 +41,7 @@ def run(
     jobs: int = 0,
     *,
     patient: bool = True,
+    reads: Iterable[Path] | None = None,
 ) -> None:
     """Run the tasks, several at a time; call `take` with each result as soon as it is done.
 
@@ -48,7 +51,9 @@ def run(
     tasks : the tasks, by any key.
     take : called in this process with a key and the result, or `Failed` for a `Palette4dError`, an
         `OSError`, or a process that was killed.
-    jobs : processes; 0: one per processor; 1: run all tasks in this process.
+    jobs : processes; 0: one per processor; 1: run all tasks in this process, unless it is a command
+        whose clips are decoded by confined processes.
+    reads : what the processes may read, if they can be confined (`Child`).
     patient : after Ctrl-C, finish and report the running tasks; otherwise they are dropped.
 
     Raises
@@ -64,7 +69,7 @@ def run(
     processors = os.cpu_count() or 1
     jobs = min(jobs or processors, max(1, len(tasks)))
     threads = max(1, processors // jobs)
-    if jobs == 1:
+    if jobs == 1 and (reads is None or not sandbox.of_command()):
         for key, task in tasks.items():
             told(key, outcome(work, task, threads))
         return
@@ -101,7 +106,7 @@ def run(
             raise
 
     with contextlib.ExitStack() as stack:
-        children = [stack.enter_context(Child()) for _ in range(jobs)]
+        children = [stack.enter_context(Child(reads=reads)) for _ in range(jobs)]
         crashed: list[Key] = []
         run_all(tasks, children, crashed.append)
         # Once more, alone: beside others there may have been too little memory.

@@ -1,7 +1,8 @@
 """The workers for many tasks: processes on this machine, or a farm."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from palette4d.jobs import dask_farm, pool
 from palette4d.jobs.pool import Failed, Key, Result, Task
@@ -23,9 +24,10 @@ class Workers:
         take: Callable[[Key, Result | Failed], None],
         *,
         patient: bool = True,
+        reads: Iterable[Path] | None = None,
     ) -> None:
         """Run the tasks and call `take` with each result (`pool.run`, `dask_farm.run`)."""
         if self.cluster is not None:
             dask_farm.run(self.cluster, work, tasks, take)
         else:
-            pool.run(work, tasks, take, self.jobs, patient=patient)
+            pool.run(work, tasks, take, self.jobs, patient=patient, reads=reads)

@@ -61,7 +61,7 @@ def plot(
     Palette4dError
         The sidecar, a frame, the clip or the output is unusable; nothing was written.
     """
-    _load_matplotlib()
+    load_matplotlib()
     import matplotlib.style
 
     from palette4d.common.errors import Palette4dError
@@ -113,7 +113,7 @@ def plot(
     return [column.frame for column in columns if not column.pictures]
 
 
-def _load_matplotlib() -> None:
+def load_matplotlib() -> None:
     """Import matplotlib without its warnings, such as of where its cache is without a home folder.
 
     It would read a matplotlibrc of the folder that it is imported in.

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -18,12 +18,14 @@ from typing import Any
 from palette4d import _core
 from palette4d.analysis import pipeline
 from palette4d.analysis.options import AnalysisOptions
+from palette4d.colour.ocio_config import files_of_config
 from palette4d.common.errors import Arg, Palette4dError, in_words
 from palette4d.common.files import make_folder
 from palette4d.common.text import counted
 from palette4d.grade import reanalysis, sidecar
 from palette4d.jobs.workers import Failed, Workers
 from palette4d.media.clip import open_clip
+from palette4d.media.clip_files import files_of
 from palette4d.media.colour_space import SpaceOptions
 from palette4d.shows import manifest as manifests
 from palette4d.shows.manifest import DONE, FAILED, TO_DO, Entry, Manifest
@@ -102,10 +104,18 @@ def analyse(
     tell(*show.progress())
     try:
         # A shot may take minutes: Ctrl-C does not wait for it.
-        options.workers.run(analyse_shot, show.tasks, take, patient=False)
+        reads = _files(show.tasks.values(), options.spaces.ocio_config)
+        options.workers.run(analyse_shot, show.tasks, take, patient=False, reads=reads)
     finally:
         show.save()
     return show
+
+
+def _files(tasks: Iterable[ShotTask], config: str | None) -> list[Path]:
+    """Return what the processes that analyse shots must read."""
+    clips = dict.fromkeys(task.clip for task in tasks)
+    found = [path for clip in clips for path in files_of(clip)]
+    return found + files_of_config(config or os.environ.get("OCIO") or "")
 
 
 class Show:

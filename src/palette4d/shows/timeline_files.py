@@ -64,7 +64,7 @@ def in_child(path: Path, call: Callable[..., Result], *arguments: object) -> Res
     regular = path / "content.otio" if path.is_dir() else path
     try:
         read_regular(regular, LARGEST_FILE)
-        with Child(SECONDS, MEGABYTES) as child:
+        with Child(SECONDS, MEGABYTES, [path]) as child:
             return child.call(call, *arguments)
     except OSError as error:
         raise Palette4dError(in_words(error)) from error

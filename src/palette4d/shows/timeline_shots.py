@@ -6,9 +6,11 @@ in the names of an image sequence, and numbers from 0 in a movie.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import re
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import Literal
@@ -20,6 +22,7 @@ from palette4d.common.text import file_safe
 from palette4d.media import clip_sequence
 from palette4d.media.clip import Clip, open_clip
 from palette4d.media.clip_base import describe
+from palette4d.media.clip_files import files_of
 from palette4d.media.timecode import (
     day_of,
     drops_numbers,
@@ -75,8 +78,8 @@ def shots_of(
     of tail frames; there are fewer where the media ends. `conform` says how the edit plays movies
     of another rate; see `_Finder.counted`.
     """
-    with Child(SECONDS, MEGABYTES) as child:
-        finder = _Finder(edit.path, folder, handles, child, conform)
+    finder = _Finder(edit.path, folder, handles, conform)
+    with Child(SECONDS, MEGABYTES, finder.files(edit.clips)) as finder.child:
         shots = [finder.shot(clip) for clip in edit.clips]
         return shots, list(dict.fromkeys(finder.notes))
 
@@ -84,19 +87,29 @@ def shots_of(
 class _Finder:
     """Finds the media of clips, and their frames in it."""
 
+    child: Child
+
     def __init__(
         self,
         path: Path,
         folder: find_media.Folder | None,
         handles: int,
-        child: Child,
         conform: Conform | None,
     ) -> None:
-        self.path, self.folder, self.handles, self.child = path, folder, handles, child
+        self.path, self.folder, self.handles = path, folder, handles
         self.conform = conform
+        self.specs: dict[int, str] = {}
         self.media: dict[str, Media | str] = {}
         self.timecodes: dict[str, str | None] = {}
         self.notes: list[str] = []
+
+    def files(self, clips: Iterable[EditClip]) -> Iterator[Path]:
+        """Yield what must be read to open the media of clips."""
+        for clip in clips:
+            with contextlib.suppress(Palette4dError, OSError, ValueError):  # `shot` says so
+                self.specs[id(clip)] = self.found(clip)
+        for spec in dict.fromkeys(self.specs.values()):
+            yield from files_of(spec)
 
     def shot(self, clip: EditClip) -> Shot:
         """Return the shot for a clip."""
@@ -111,7 +124,7 @@ class _Finder:
 
     def found_shot(self, clip: EditClip) -> Shot:
         """Return the shot for a clip whose media is there."""
-        spec = self.found(clip)
+        spec = self.specs.get(id(clip)) or self.found(clip)
         media = self.opened(spec)
         first, last = self.frames(clip, spec, media)
         if not media.first <= first <= last <= media.last:

@@ -1,0 +1,209 @@
+"""A process that writes for one that is confined, and only what that was begun for.
+
+It is a fork of the command, from before the command confines itself. The command writes its files
+into a folder of their own; this process moves them to their places, makes folders, and holds locks.
+It refuses other names, for the command may have fallen into the hands of a file that it reads.
+Requests are JSON, answers are pickles: the command trusts this process, and never the reverse.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import pickle
+import secrets
+import shutil
+import signal
+import stat
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+from palette4d.common import files, locking
+from palette4d.common.errors import Palette4dError
+
+
+@dataclass(frozen=True)
+class Promise:
+    """What a command may write.
+
+    Attributes
+    ----------
+    folder : with its files; it need not exist yet.
+    ending : of their names.
+    below : whether folders in it belong to it.
+    linked : the one other file that may be written, to which a link leads.
+    """
+
+    folder: Path
+    ending: str
+    below: bool = False
+    linked: Path | None = None
+
+    @classmethod
+    def of_file(cls, path: Path) -> Promise:
+        """Return the promise to write a file, or others of its kind beside it."""
+        suffix = ".p4d.json" if path.name.endswith(".p4d.json") else path.suffix
+        with contextlib.suppress(Palette4dError, OSError):  # the write says so
+            return cls(path.parent, suffix, linked=files.link_target(path))
+        return cls(path.parent, suffix)
+
+    def holds(self, path: Path) -> bool:
+        """Whether a file's path is among those that were promised."""
+        if path.name.startswith(".") or not path.name.endswith(self.ending):
+            return False
+        own, there = os.path.realpath(self.folder), Path(os.path.realpath(path.parent))
+        near = there.is_relative_to(own) if self.below else str(there) == own
+        return near or (self.linked is not None and path == self.linked.absolute())
+
+    def leads_to(self, folder: Path) -> bool:
+        """Whether a folder may be made: this one, one on the way to it, or one in it."""
+        own, there = os.path.realpath(self.folder), os.path.realpath(folder)
+        return Path(own).is_relative_to(there) or (self.below and Path(there).is_relative_to(own))
+
+
+class Writer:
+    """The confined command's side.
+
+    Attributes
+    ----------
+    folder : the one folder that the command writes in; None where it can write nothing.
+    """
+
+    def __init__(self, requests: IO[str], answers: IO[bytes]) -> None:
+        self._requests, self._answers = requests, answers
+        self.folder: Path | None = self._answer()
+
+    def ask(self, what: str, *arguments: object) -> Any:
+        """Let the other process do something; raise its error."""
+        print(json.dumps([what, *arguments]), file=self._requests, flush=True)
+        return self._answer()
+
+    def _answer(self) -> Any:
+        found, error = pickle.load(self._answers)  # noqa: S301 - of the process that we trust
+        if error is not None:
+            raise error
+        return found
+
+    @contextlib.contextmanager
+    def replacing(
+        self, path: Path, *, force: bool, check: Callable[[], None] | None
+    ) -> Iterator[Path]:
+        """Yield a temporary file; move it to `path` when the body succeeds (`files.replacing`)."""
+        files.refuse_existing(files.link_target(path), force)
+        if self.folder is None:
+            raise files.closed(path)
+        temporary = self.folder / f"{secrets.token_hex(8)}{path.suffix}"
+        try:
+            yield temporary
+            if check is not None:
+                check()
+            self.ask("place", temporary.name, os.fspath(path.absolute()), force)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+    @contextlib.contextmanager
+    def locked(self, target: Path) -> Iterator[Callable[[], None]]:
+        """Hold the lock of a file (`locking.locked`)."""
+        self.ask("lock", os.fspath(target.absolute()))
+        try:
+            yield lambda: self.ask("held")
+        finally:
+            self.ask("unlock")
+
+
+@contextlib.contextmanager
+def writer_for(promise: Promise) -> Iterator[Writer]:
+    """Start the process that writes; it ends, and clears up, when the body or this process ends."""
+    requests, ask = os.pipe()
+    answer, answers = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        status = 1
+        try:
+            os.close(ask)
+            os.close(answer)
+            with os.fdopen(requests) as asked, os.fdopen(answers, "wb") as answering:
+                _serve(promise, asked, answering)
+            status = 0
+        finally:
+            os._exit(status)
+    os.close(requests)
+    os.close(answers)
+    try:
+        with os.fdopen(ask, "w") as asking, os.fdopen(answer, "rb") as answered:
+            locking.delegate = writer = Writer(asking, answered)
+            if writer.folder is not None:
+                tempfile.tempdir = str(writer.folder)
+            yield writer
+    finally:
+        locking.delegate = tempfile.tempdir = None
+        os.waitpid(pid, 0)
+
+
+def _serve(promise: Promise, requests: IO[str], answers: IO[bytes]) -> None:
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)  # it ends with the command
+    held: list[Callable[[], None]] = []
+    with contextlib.ExitStack() as stack, contextlib.ExitStack() as lock:
+        folder = _own_folder(promise, stack)
+
+        def do(what: str, *arguments: Any) -> None:
+            if what == "place" and folder is not None:
+                name, path, force = arguments
+                _place(folder / Path(name).name, Path(path), force, promise)
+            elif what == "make_folder" and promise.leads_to(Path(arguments[0])):
+                files.make_folder(Path(arguments[0]))
+            elif what == "lock" and promise.holds(Path(arguments[0])):
+                held[:] = [lock.enter_context(locking.locked(Path(arguments[0])))]
+            elif what == "held" and held:
+                held[0]()
+            elif what == "unlock":
+                lock.close()
+            else:
+                raise _unasked(*arguments)
+
+        _send(answers, folder)
+        for line in requests:
+            try:
+                do(*json.loads(line))
+            except Exception as error:
+                _send(answers, None, error)
+            else:
+                _send(answers, None)
+
+
+def _send(answers: IO[bytes], found: object, error: Exception | None = None) -> None:
+    with contextlib.suppress(BrokenPipeError):
+        pickle.dump((found, error), answers)
+        answers.flush()
+
+
+def _own_folder(promise: Promise, stack: contextlib.ExitStack) -> Path | None:
+    """Return a folder on the disk of the promise; None where none can be made."""
+    parent = (promise.linked or promise.folder / "file").absolute().parent
+    while not parent.is_dir() and parent != parent.parent:
+        parent = parent.parent
+    try:
+        return stack.enter_context(files.temporary_folder(parent))
+    except OSError:
+        return None  # the write says so
+
+
+def _place(temporary: Path, path: Path, force: bool, promise: Promise) -> None:
+    if not promise.holds(path) or not stat.S_ISREG(temporary.lstat().st_mode):
+        raise _unasked(path)
+    with files.replacing(path, force=force) as own:
+        if path.exists():
+            temporary.chmod(0o600)  # until it has the rights of the old file
+        shutil.move(temporary, own)
+
+
+def _unasked(*what: object) -> Palette4dError:
+    return Palette4dError(
+        f"{' '.join(map(str, what))}: the command is confined, and this is none of the files that "
+        "it was begun for; was a file that it reads made to take it over?"
+    )

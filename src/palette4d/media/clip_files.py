@@ -1,0 +1,36 @@
+"""The files and folders that are read with a clip, before anything of it is decoded."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from palette4d import _core
+from palette4d.common import sandbox
+from palette4d.media.clip_sequence import IMAGE_EXTENSIONS, MOVIE_EXTENSIONS, extension
+from palette4d.media.reading import split
+from palette4d.media.source_clip import candidates
+
+
+def files_of(spec: str) -> Iterator[Path]:
+    """Yield what a confined process must read to open a clip, by its name for `open_clip`."""
+    path = Path(spec if Path(spec).exists() else split(spec)[0])
+    if path.is_file() and extension(path) in MOVIE_EXTENSIONS:
+        yield path
+    else:
+        yield from sandbox.parts(path if path.is_dir() else path.parent, IMAGE_EXTENSIONS)
+
+
+def files_of_sidecar(path: Path, clip: str | None = None) -> Iterator[Path]:
+    """Yield what must be read for a sidecar, and for its clip or the one that is given.
+
+    Raises
+    ------
+    SidecarError
+        The file is no sidecar.
+    """
+    yield path
+    yield from sandbox.parts(path.parent, {"json"})
+    source = str(_core.read_sidecar(str(path)).clip["source"])
+    for spec in candidates(path, source) if clip is None else [clip]:
+        yield from files_of(spec)

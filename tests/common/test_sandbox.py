@@ -1,0 +1,183 @@
+"""A process that decodes a stranger's file reads and writes what its verb needs, and no more."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import hostile_reader
+import pytest
+from edits import sequence
+from farm_processes import wait_for
+
+from palette4d.common import sandbox
+from palette4d.common.errors import Palette4dError
+
+GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
+
+confines = pytest.mark.skipif(bool(sandbox.missing()), reason=sandbox.missing() or "confines")
+
+VERBS = {
+    "analyze": "analyze clip/ -o out.p4d.json --quiet",
+    "detect": "analyze clip/ --detect-shots -o shots --quiet",
+    "edit": "analyze edit.edl --media clip -o shots --quiet --jobs 1",
+    "render": "render own.p4d.json clip/ -o out.####.exr --quiet",
+    "movie": "render own.p4d.json clip/ -o out.mov --quiet",
+    "plot": "plot own.p4d.json -o out.png --frames 0",
+    "bake": "bake own.p4d.json --frame 0 -o out.cube",
+    "export": "export own.p4d.json --frames 0 -o luts --jobs 1",
+    "config": "config own.p4d.json --frames 0 -o config --anyway --jobs 1",
+    "pick": "edit own.p4d.json pick --clip clip/ --frame 0 --pixel 3,3 --to 0.1,0.2,0.9",
+}
+EDL = """TITLE: edit
+FCM: NON-DROP FRAME
+
+001  frame  V     C        00:00:00:00 00:00:00:04 01:00:00:00 01:00:00:04
+* FROM CLIP NAME: frame.####.png
+"""
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Path:
+    """A home folder with what strangers want, and a clip and its sidecar right in it."""
+    home = tmp_path / "home"
+    (home / ".ssh").mkdir(parents=True)
+    (home / ".ssh" / "id_rsa").write_text("a key")
+    (home / ".bashrc").write_text("alias ls='ls --color'\n")
+    (home / "clip").mkdir()
+    sequence(home / "clip", "frame", 0, 6)
+    (home / "edit.edl").write_text(EDL)
+    hook = tmp_path / "hook"
+    hook.mkdir()
+    shutil.copyfile(hostile_reader.__file__, hook / "sitecustomize.py")
+    return home
+
+
+def command(home: Path, *words: str, hostile: bool = True) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"HOME": str(home), "HOSTILE_PARENT": str(os.getpid())}
+    if hostile:
+        environment["PYTHONPATH"] = str(home.parent / "hook")
+    return subprocess.run(
+        [sys.executable, "-P", "-m", "palette4d", *words],
+        cwd=home,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
+def told(done: subprocess.CompletedProcess[str]) -> list[list[str]]:
+    """What succeeded, at each clip that was opened."""
+    lines = [line for line in done.stderr.splitlines() if line.startswith('{"hostile"')]
+    return [json.loads(line)["hostile"] for line in lines]
+
+
+def test_without_a_sandbox_a_reader_may_do_all_of_it(home: Path) -> None:
+    """Else the other tests could not fail."""
+    shutil.copyfile(GOLDEN / "v2_picks.p4d.json", home / "own.p4d.json")
+    done = command(home, *VERBS["render"].split(), "--sandbox", "off")
+    found = told(done)
+    assert done.returncode == 0, done.stderr
+    missed = set(hostile_reader.attempts(home, os.getpid())) - set(found[0])
+    # What this machine refuses to everybody.
+    assert missed <= {"namespace", "io_uring", "change attributes"}
+
+
+@confines
+@pytest.mark.parametrize("verb", VERBS)
+def test_a_reader_that_is_taken_over_can_do_nothing(home: Path, verb: str) -> None:
+    """And the verb itself works as ever, right in the home folder."""
+    before = sorted(path.name for path in home.iterdir())
+    own = home / "own.p4d.json"
+    shutil.copyfile(GOLDEN / "v2_picks.p4d.json", own)
+    own.chmod(0o640)
+    words = VERBS[verb].split()
+    done = command(home, words[0], "--sandbox", "on", *words[1:])
+    assert done.returncode == 0, done.stderr
+    found = told(done)
+    assert found
+    assert found == [[]] * len(found)
+    fonts = {".cache", ".config"}  # matplotlib's, made before the clip is opened
+    made = {path.name for path in home.iterdir()} - {*before, own.name, *fonts}
+    assert made or verb == "pick"
+    assert not [name for name in made if name.startswith((".", "evil"))]
+    assert stat.S_IMODE(own.stat().st_mode) == 0o640
+    assert (home / ".bashrc").stat().st_size > 1
+
+
+def test_where_the_kernel_cannot_on_is_an_error_and_auto_goes_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sandbox, "missing", lambda: "the kernel has no Landlock")
+    assert not sandbox.wanted()
+    monkeypatch.setattr(sandbox, "mode", "on")
+    with pytest.raises(Palette4dError, match="no Landlock"):
+        sandbox.wanted()
+
+
+def script(tmp_path: Path, *lines: str) -> subprocess.Popen[str]:
+    """A program that has a writer for `out.mov` in the folder `out`."""
+    text = [
+        *("import os, sys, time", "from pathlib import Path", f"os.chdir({str(tmp_path)!r})"),
+        *("from palette4d.common import files, writer", "Path('out').mkdir(exist_ok=True)"),
+        "from palette4d.common.errors import Palette4dError",
+        "with writer.writer_for(writer.Promise.of_file(Path('out/out.mov'))) as own:",
+        *(f"    {line}" for line in lines),
+    ]
+    return subprocess.Popen(
+        [sys.executable, "-P", "-c", "\n".join(text)], text=True, stdout=subprocess.PIPE
+    )
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_the_writer_refuses_what_the_command_was_not_begun_for(tmp_path: Path) -> None:
+    (tmp_path / "link.mov").symlink_to(tmp_path / "secret")
+    (tmp_path / "secret").write_text("secret")
+    tries = ["out/.hidden.mov", "out/a.sh", "a.mov", "out/below/a.mov", "out/../a.mov", "../a.mov"]
+    with script(
+        tmp_path,
+        "(own.folder / 'x').write_text('evil')",
+        "(own.folder / 'link').symlink_to('/etc/passwd')",
+        f"asked = [['place', 'x', str(Path(p).absolute()), True] for p in {tries}]",
+        "asked += [['place', 'link', str(Path('out/out.mov').absolute()), True]]",
+        "asked += [['place', '../../secret', str(Path('out/out.mov').absolute()), True]]",
+        "asked += [['make_folder', str(Path('out/other').absolute())], ['lock', '/tmp/a.sh']]",
+        "asked += [['held'], ['remove', 'secret'], ['place', 'x']]",
+        "for one in asked:",
+        "    try:",
+        "        own.ask(*one)",
+        "    except Exception:",
+        "        continue",
+        "    print(one)",
+        "with files.replacing(Path('out/out.mov')) as path:",
+        "    path.write_text('a movie')",
+    ) as done:
+        assert done.communicate(timeout=60)[0] == ""
+    assert done.returncode == 0
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["out.mov"]
+    assert (tmp_path / "out" / "out.mov").read_text() == "a movie"
+    assert (tmp_path / "secret").read_text() == "secret"
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_a_command_that_is_killed_leaves_nothing(tmp_path: Path) -> None:
+    """Its writer ends with it, gives the lock back, and removes the temporary folder."""
+    with script(
+        tmp_path,
+        "with own.locked(Path('out/a.mov')), files.replacing(Path('out/out.mov')) as path:",
+        "    path.write_text('a part')",
+        "    print('there', flush=True)",
+        "    time.sleep(60)",
+    ) as running:
+        assert running.stdout
+        assert running.stdout.readline() == "there\n"
+        assert len(list((tmp_path / "out").iterdir())) == 2
+        running.kill()
+    wait_for(lambda: not list((tmp_path / "out").iterdir()), "an empty folder")
