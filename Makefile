@@ -21,7 +21,7 @@ SLOW ?=
 # How long each reader is fuzzed: make test-fuzz FUZZ_SECONDS=3600
 FUZZ_SECONDS ?= 60
 # Which readers are fuzzed: make test-fuzz FUZZ="sidecar edl"
-FUZZ ?= sidecar copy node program manifest index correction otio edl
+FUZZ ?= sidecar copy node program verbs manifest index correction otio edl
 
 # An OpenFX SDK whose headers the C++ tests are to be built with: make test OPENFX_ROOT=/path/to/openfx
 OPENFX_ROOT ?=
@@ -51,7 +51,7 @@ CXX_FILES = $(shell find ofx_plugin tests -name '*.cpp' -o -name '*.hpp' -o -nam
 
 .PHONY: help demo studio docs-images test test-all install dev wheel lint style types build-cpp build-sanitize build-threads \
 	build-fuzz test-cpp test-sanitize test-threads test-threads-short test-fuzz test-py format clean \
-	compiler fuzz-compiler sbom lock test-reproducible bundles bundles-again test-bundles wheels
+	compiler fuzz-compiler fuzz-coverage audit sbom lock test-reproducible bundles bundles-again test-bundles wheels
 
 help: ## this list
 	@echo "make demo            from nothing to results in demo_output/"
@@ -205,6 +205,12 @@ lock: $(SUPPLY)/.installed ## the newest versions of all that make downloads, pi
 	of bundle-test; compile bundle-test $(SUPPLY)/in.txt; \
 	of supply; compile supply $(SUPPLY)/in.txt
 
+# PyPI answers; what palette4d itself compiles in stands in the wheel's own list.
+audit: $(SUPPLY)/.installed ## known faults of all that is pinned (asks PyPI)
+	@for lock in $(wildcard locks/*.txt); do \
+		echo "== $$lock"; $(SUPPLY)/bin/pip-audit --require-hashes --disable-pip -r $$lock || exit; \
+	done
+
 # What is compiled into the wheel stands in its own list, palette4d-*.dist-info/sboms/.
 sbom: $(SUPPLY)/.installed $(VENV)/.installed ## what stands in .venv, with versions and licences
 	@$(SUPPLY)/bin/cyclonedx-py environment $(VENV)/bin/python --pyproject pyproject.toml \
@@ -257,7 +263,7 @@ test: ## what a change must pass: all but the slow tests
 # libFuzzer, a wheel built as pip builds it for users, and what a release holds.
 test-all: ## everything, before a release
 	$(MAKE) SLOW=1 test test-threads wheel test-reproducible
-	$(MAKE) FUZZ_SECONDS=600 test-fuzz
+	$(MAKE) FUZZ_SECONDS=600 test-fuzz fuzz-coverage audit
 	$(MAKE) bundles-again test-bundles wheels
 	@echo "== all of make test-all passed"
 
@@ -331,6 +337,9 @@ $(addprefix fuzz-,$(filter-out $(FUZZ_NATIVE),$(FUZZ))): fuzz-%: $(TEST_VENV)/.i
 	@echo "== $* with any bytes, $(FUZZ_SECONDS) s"
 	@PALETTE4D_REQUIRE_HOST= PALETTE4D_FUZZ_SECONDS=$(FUZZ_SECONDS) PALETTE4D_FUZZ_SEED="$$(date +%s)" \
 		$(TEST_VENV)/bin/python -P -m pytest -q -s tests/fuzz -k $* -m "not slow" -o faulthandler_timeout=0
+
+fuzz-coverage: build-fuzz ## the lines of the readers that the fuzz corpora reach, with a floor
+	@$(TOOLS)/bin/python tools/fuzz_coverage.py build/cmake/fuzz
 
 # From a folder of its own, so that no file of the tree can stand in for the installed package.
 # One test more than processors: some wait for a host or for a process.

@@ -1,4 +1,4 @@
-"""What the readers do with any bytes: the targets of tests/fuzz/test_readers.py.
+"""What the readers and verbs do with any bytes: the targets of tests/fuzz/test_readers.py.
 
 Each takes a file and a folder for what it writes. It returns "accepted" or "refused"; every other
 error than `Palette4dError` is a fault. `many` gives them mutations of tests/fuzz/readers/.
@@ -24,14 +24,18 @@ from palette4d.lut_export import cdl, series_index
 from palette4d.lut_export.series import Series
 from palette4d.lut_export.writers import Description
 
+import palette4d
+from palette4d import _core
 from palette4d.cli import export
-from palette4d.cli.main import build_parser
-from palette4d.common.errors import Palette4dError
+from palette4d.cli.main import build_parser, main
+from palette4d.common.errors import Palette4dError, SidecarError
 from palette4d.shows import manifest as manifests
 from palette4d.shows import timeline_clips, timeline_shots
 from palette4d.shows.shots import numbered
 
 CORPORA = Path(__file__).parent / "fuzz/readers"
+GOLDEN = Path(__file__).parent / "golden/sidecars"
+SIDECARS = [GOLDEN / f"{name}.p4d.json" for name in ("v1_edited", "v1_split", "v2_picks")]
 TOKENS = (
     *(b"{", b"}", b"[", b"]", b",", b":", b'"', b"null", b"true", b"[]", b"{}", b'""', b"-", b"\0"),
     *(b"1e999", b"-1e308", b"0.5", b"NaN", b"9" * 400, b"2147483648", b"\\ud800", b"\\u0000"),
@@ -109,7 +113,53 @@ def edit(path: Path, folder: Path) -> str:
     return "accepted"
 
 
+#: What a sidecar is given to: the verbs that read one, without those that decode or take seconds.
+VERBS = (
+    *(("info", "S", "--json"), ("slice", "S", "--frame", "1"), ("edit", "S", "history")),
+    *(("edit", "S", "picks", "--json"), ("edit", "S", "set", "v1", "--rgb", "0.1", "0.2", "0.3")),
+    *(("edit", "S", "ramp", "smooth"), ("edit", "S", "version", "save", "one")),
+    *(("edit", "S", "reset"), ("edit", "S", "undo"), ("edit", "S", "redo")),
+    *(("edit", "S", "track", "v1", "--hue", "20"), ("edit", "S", "version", "list")),
+)
+
+
+def verbs(path: Path, folder: Path) -> str:
+    """Give a sidecar to the core's reader, to `palette4d.load` and to the verbs.
+
+    All accept it or none does. Who refuses it changes nothing; who accepts it keeps its `extra`,
+    where other programs write.
+    """
+    before = path.read_bytes()
+    try:
+        _core.read_sidecar(str(path))
+        accepted = True
+    except SidecarError:
+        accepted = False
+    try:
+        palette4d.load(path)
+        loaded = True
+    except SidecarError:
+        loaded = False
+    assert loaded == accepted, "palette4d.load and the core do not agree"
+    for words in VERBS:
+        output = io.StringIO()
+        given = [str(path) if word == "S" else word for word in words]
+        with contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
+            status = main(given)
+        assert status in ((0, 1) if accepted else (1,)), (words, status)
+        if status == 1:
+            assert "palette4d: error: " in output.getvalue(), words
+            assert path.read_bytes() == before, words
+        else:
+            after = path.read_bytes()
+            assert json.loads(after).get("extra") == json.loads(before).get("extra"), words
+            _core.read_sidecar(str(path))
+            before = after
+    return "accepted" if accepted else "refused"
+
+
 TARGETS = {
+    "verbs": verbs,
     "manifest": manifest,
     "index": index,
     "correction": correction,
@@ -123,7 +173,8 @@ def many(kind: str, seed: str, first: int, count: int, folder: Path) -> collecti
 
     The file `number` in the folder holds the number of the input that is tried.
     """
-    corpus = [path.read_bytes() for path in sorted((CORPORA / kind).iterdir())]
+    files = SIDECARS if kind == "verbs" else sorted((CORPORA / kind).iterdir())
+    corpus = [path.read_bytes() for path in files]
     path = folder / f"input.{kind}"
     outcomes: collections.Counter[str] = collections.Counter()
     told = os.open(folder / "number", os.O_WRONLY | os.O_CREAT)

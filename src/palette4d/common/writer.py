@@ -46,7 +46,8 @@ class Promise:
     @classmethod
     def of_file(cls, path: Path) -> Promise:
         """Return the promise to write a file, or others of its kind beside it."""
-        suffix = ".p4d.json" if path.name.endswith(".p4d.json") else path.suffix
+        whole = path.name.endswith(".p4d.json")
+        suffix = ".p4d.json" if whole else path.suffix or path.name
         with contextlib.suppress(Palette4dError, OSError):  # the write says so
             return cls(path.parent, suffix, linked=files.link_target(path))
         return cls(path.parent, suffix)
