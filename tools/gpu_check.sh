@@ -20,7 +20,7 @@ pack() {
     rm -rf "$folder"
     mkdir -p "$folder/lib" "$folder/vendors" "$folder/sidecars"
     cp -r "$build/node/Palette4D.ofx.bundle" "$folder/"
-    cp "$build/tests/host/palette4d_host_tests" "$folder/"
+    cp "$build/tests/host/palette4d_host_tests" "$build"/tests/host/libpalette4d_opencl_faults.so "$folder/"
     strip "$folder/palette4d_host_tests"
     # Its libraries, for a machine whose own are older, and OpenCL's loader, which drivers lack.
     ldd "$folder/palette4d_host_tests" | awk '$3 ~ /^\// {print $3} $1 ~ /^\// {print $1}' |

@@ -79,26 +79,18 @@ const CudaFunctions* cuda_functions() {
 }
 
 /// The kernel in a context.
-struct Module {
-    std::mutex mutex{};
+struct Module : Context {
     Handle module = nullptr, function = nullptr;
-    std::string problem{};
 
-    void load(const CudaFunctions& cu) {
-        if (function || !problem.empty()) return;
+    std::string load(const CudaFunctions& cu) {
+        if (function) return "";
         int error = cu.cuModuleLoadData(&module, cuda_ptx());
-        if (error) {
-            module = nullptr;
-            problem = driver_error("cuModuleLoadData", error);
-            return;
-        }
+        if (error) return driver_error("cuModuleLoadData", error);
         error = cu.cuModuleGetFunction(&function, module, "p4d_draw");
-        if (!error) {
-            // What a device lacks shows when a table of that size is drawn.
-            cu.cuFuncSetAttribute(function, kMostShared, kMostTable * sizeof(float));
-        } else {
-            problem = driver_error("cuModuleGetFunction", error);
-        }
+        if (error) return driver_error("cuModuleGetFunction", error);
+        // What a device lacks shows when a table of that size is drawn.
+        cu.cuFuncSetAttribute(function, kMostShared, kMostTable * sizeof(float));
+        return "";
     }
 };
 
@@ -137,21 +129,6 @@ public:
         char name[256] = "";
         if (cu_.cuCtxGetDevice(&device) == 0) cu_.cuDeviceGetName(name, sizeof name - 1, device);
         return std::string(name) + " (CUDA)";
-    }
-
-    std::string draw(const FrameTable& frame, const Window& window) override {
-        std::string problem;
-        {
-            const std::lock_guard<std::mutex> lock(module_->mutex);
-            module_->load(cu_);
-            problem = module_->problem;
-        }
-        if (problem.empty()) problem = launch(frame, window);
-        if (!problem.empty()) {
-            const std::lock_guard<std::mutex> lock(module_->mutex);
-            module_->problem = problem;
-        }
-        return problem;
     }
 
     std::string read(const Place& from, std::size_t bytes, int height, char* to,
@@ -197,7 +174,14 @@ private:
         Memory& operator=(const Memory&) = delete;
     };
 
-    std::string launch(const FrameTable& frame, const Window& window) {
+    Context& context() override { return *module_; }
+    std::string load() override { return module_->load(cu_); }
+    std::string wait() override {
+        const int error = cu_.cuStreamSynchronize(stream_);
+        return error ? driver_error("cuStreamSynchronize", error) : "";
+    }
+
+    std::string enqueue(const FrameTable& frame, const Window& window) override {
         const std::size_t table = frame.table.size() * sizeof(float);
         const std::size_t grids = frame.grids.size() * sizeof(float);
         const Memory memory(cu_, table + grids, stream_);
@@ -221,8 +205,7 @@ private:
                                    std::min(rows / kRows, 65535u), 1, kThreads, 1, 1,
                                    static_cast<unsigned>(table), stream_, arguments, nullptr);
         if (error) return driver_error("cuLaunchKernel", error);
-        if (waits_) error = cu_.cuStreamSynchronize(stream_);
-        return error ? driver_error("cuStreamSynchronize", error) : "";
+        return waits_ ? wait() : "";
     }
 
     /// Calls copy(address, bytes, y) for each row, or once where rows have no gaps; then waits.
@@ -235,9 +218,8 @@ private:
         for (int y = 0; y < (whole ? 1 : height) && !error; ++y) {
             error = copy(address(place, y), size, y);
         }
-        const int finished = cu_.cuStreamSynchronize(stream_);
-        if (error) return driver_error("copying pixels", error);
-        return finished ? driver_error("cuStreamSynchronize", finished) : "";
+        const std::string finished = wait();
+        return error ? driver_error("copying pixels", error) : finished;
     }
 
     const CudaFunctions& cu_;

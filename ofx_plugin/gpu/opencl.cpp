@@ -51,6 +51,8 @@ struct ClFunctions {
     Int(PALETTE4D_CL* clReleaseMemObject)(Handle);
     Int(PALETTE4D_CL* clReleaseKernel)(Handle);
     Int(PALETTE4D_CL* clReleaseProgram)(Handle);
+    Int(PALETTE4D_CL* clRetainContext)(Handle);
+    Int(PALETTE4D_CL* clReleaseContext)(Handle);
 };
 
 /// Null where OpenCL is not here.
@@ -69,7 +71,8 @@ const ClFunctions* cl_functions() {
                      PALETTE4D_FIND(clEnqueueReadBuffer) && PALETTE4D_FIND(clEnqueueWriteBuffer) &&
                      PALETTE4D_FIND(clFlush) && PALETTE4D_FIND(clFinish) &&
                      PALETTE4D_FIND(clReleaseMemObject) && PALETTE4D_FIND(clReleaseKernel) &&
-                     PALETTE4D_FIND(clReleaseProgram);
+                     PALETTE4D_FIND(clReleaseProgram) && PALETTE4D_FIND(clRetainContext) &&
+                     PALETTE4D_FIND(clReleaseContext);
 #undef PALETTE4D_FIND
         return all;
     }();
@@ -77,30 +80,29 @@ const ClFunctions* cl_functions() {
 }
 
 /// The kernel's program for a device of a context.
-struct Program {
+struct Program : Context {
     const ClFunctions& cl;
-    std::mutex mutex{};
-    Handle program = nullptr;
-    std::string problem{};
+    Handle context, program = nullptr;
+    bool kept;
 
-    explicit Program(const ClFunctions& functions) : cl(functions) {}
+    /// Keeps the context, so that no other one gets its handle.
+    Program(const ClFunctions& functions, Handle of)
+        : cl(functions), context(of), kept(cl.clRetainContext(of) == 0) {}
     ~Program() {
         if (program) cl.clReleaseProgram(program);
+        if (kept) cl.clReleaseContext(context);
     }
     Program(const Program&) = delete;
     Program& operator=(const Program&) = delete;
 
-    void build(Handle context, Handle device) {
-        if (program || !problem.empty()) return;
+    std::string build(Handle device) {
+        if (program) return "";
         const char* text = opencl_text();
         Int error = 0;
         program = cl.clCreateProgramWithSource(context, 1, &text, nullptr, &error);
-        if (!program) {
-            problem = driver_error("clCreateProgramWithSource", error);
-            return;
-        }
+        if (!program) return driver_error("clCreateProgramWithSource", error);
         error = cl.clBuildProgram(program, 1, &device, "", nullptr, nullptr);
-        if (error) problem = driver_error("clBuildProgram", error);
+        return error ? driver_error("clBuildProgram", error) : "";
     }
 };
 
@@ -122,20 +124,14 @@ public:
         : cl_(functions), queue_(queue), context_(context), device_(device) {
         Programs& all = programs();
         const std::lock_guard<std::mutex> lock(all.mutex);
-        program_ = all.kept.get({context, device}, [&] { return std::make_shared<Program>(cl_); });
+        program_ = all.kept.get({context, device},
+                                [&] { return std::make_shared<Program>(cl_, context); });
     }
 
     std::string device() const override {
         char name[256] = "";
         cl_.clGetDeviceInfo(device_, kDeviceName, sizeof name - 1, name, nullptr);
         return std::string(name) + " (OpenCL)";
-    }
-
-    std::string draw(const FrameTable& frame, const Window& window) override {
-        const std::lock_guard<std::mutex> lock(program_->mutex);
-        program_->build(context_, device_);
-        if (program_->problem.empty()) program_->problem = enqueue(frame, window);
-        return program_->problem;
     }
 
     std::string read(const Place& from, std::size_t bytes, int height, char* to,
@@ -177,7 +173,14 @@ private:
         }
     };
 
-    std::string enqueue(const FrameTable& frame, const Window& window) {
+    Context& context() override { return *program_; }
+    std::string load() override { return program_->build(device_); }
+    std::string wait() override {
+        const Int error = cl_.clFinish(queue_);
+        return error ? driver_error("clFinish", error) : "";
+    }
+
+    std::string enqueue(const FrameTable& frame, const Window& window) override {
         Bits most = 0;
         cl_.clGetDeviceInfo(device_, kDeviceMaxConstant, sizeof most, &most, nullptr);
         if (most < frame.table.size() * sizeof(float)) return "too little constant memory";
@@ -213,8 +216,8 @@ private:
         error = cl_.clEnqueueNDRangeKernel(queue_, kernel.kernel, 2, nullptr, size, nullptr, 0,
                                            nullptr, nullptr);
         if (error) return driver_error("clEnqueueNDRangeKernel", error);
-        cl_.clFlush(queue_);
-        return "";
+        error = cl_.clFlush(queue_);
+        return error ? driver_error("clFlush", error) : "";
     }
 
     /// Calls copy(offset, bytes, y) for each row, or once where rows have no gaps; then waits.
@@ -229,9 +232,8 @@ private:
             if (at < 0) return "a buffer cannot be read before its start";
             error = copy(static_cast<std::size_t>(at), size, y);
         }
-        const Int finished = cl_.clFinish(queue_);
-        if (error) return driver_error("copying pixels", error);
-        return finished ? driver_error("clFinish", finished) : "";
+        const std::string finished = wait();
+        return error ? driver_error("copying pixels", error) : finished;
     }
 
     const ClFunctions& cl_;

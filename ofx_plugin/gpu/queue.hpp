@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <mutex>
 #include <string>
 
 #include "gpu/frame_table.hpp"
@@ -25,6 +26,12 @@ struct Window {
     int x1 = 0, y1 = 0, x2 = 0, y2 = 0;
 };
 
+/// A driver's error in a context. After it the context is not asked again.
+struct Context {
+    std::mutex mutex{};
+    std::string problem{};
+};
+
 /// For one render, in one thread. Functions return what went wrong, or nothing.
 class Queue {
 public:
@@ -32,14 +39,23 @@ public:
     /// The device, as its driver names it, and the system.
     virtual std::string device() const = 0;
     /// Draws after what the queue has, and does not wait where the host does not expect it. After
-    /// an error the context is not asked again, and each draw() returns the error.
-    virtual std::string draw(const FrameTable& frame, const Window& window) = 0;
+    /// an error each draw() of this context returns it. With `took` it waits, and sets the
+    /// milliseconds of this draw.
+    std::string draw(const FrameTable& frame, const Window& window, double* took = nullptr);
     /// Copy `height` rows of `bytes` bytes, from the device to rows of `row` bytes and back. Both
     /// wait until that is done.
     virtual std::string read(const Place& from, std::size_t bytes, int height, char* to,
                              std::ptrdiff_t row) = 0;
     virtual std::string write(const char* from, std::ptrdiff_t row, std::size_t bytes, int height,
                               const Place& to) = 0;
+
+protected:
+    virtual Context& context() = 0;
+    /// Makes the kernel ready; under the context's mutex.
+    virtual std::string load() = 0;
+    virtual std::string enqueue(const FrameTable& frame, const Window& window) = 0;
+    /// Until all work is done.
+    virtual std::string wait() = 0;
 };
 
 /// A cl_command_queue. Null where OpenCL cannot be loaded.

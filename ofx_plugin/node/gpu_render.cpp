@@ -2,7 +2,10 @@
 
 #include <cstdint>
 #include <cstdlib>
+#include <iomanip>
 #include <limits>
+#include <locale>
+#include <sstream>
 
 namespace palette4d::node {
 namespace {
@@ -88,7 +91,7 @@ GpuRender::GpuRender(const Properties& arguments) {
 }
 
 std::string draw_by_kernel(gpu::Queue& queue, const Image* in, const Image& out,
-                           const OfxRectI& window, const NodeDrawing& drawing) {
+                           const OfxRectI& window, const NodeDrawing& drawing, double* took) {
     if (!is_float_rgba(out)) return "the kernel lacks pictures other than RGBA in float";
     if (!addressable(out) || (in && !addressable(*in))) return "the kernel lacks rows of this size";
     const std::string lacking = gpu::lacks(drawing);
@@ -111,7 +114,14 @@ std::string draw_by_kernel(gpu::Queue& queue, const Image* in, const Image& out,
         }
     }
     const bool premultiplied = in && in->premultiplied;
-    return queue.draw(gpu::frame_table(drawing, premultiplied), work);
+    return queue.draw(gpu::frame_table(drawing, premultiplied), work, took);
+}
+
+std::string words_of_time(double milliseconds) {
+    std::ostringstream text;
+    text.imbue(std::locale::classic());
+    text << std::fixed << std::setprecision(milliseconds < 10 ? 1 : 0) << milliseconds << " ms";
+    return text.str();
 }
 
 HostCopy::HostCopy(gpu::Queue& queue, const std::optional<Image>& from) {

@@ -33,9 +33,12 @@ struct GpuRender {
 };
 
 /// Draws the window with the kernel; `in` is null for transparent black. Returns what kept it from
-/// that; the window is then as it was.
+/// that. `took` as in Queue::draw().
 std::string draw_by_kernel(gpu::Queue& queue, const Image* in, const Image& out,
-                           const OfxRectI& window, const NodeDrawing& drawing);
+                           const OfxRectI& window, const NodeDrawing& drawing, double* took);
+
+/// "1.7 ms", "34 ms"
+std::string words_of_time(double milliseconds);
 
 /// An image's copy in the host's memory.
 class HostCopy {

@@ -199,6 +199,26 @@ void note_gpu(OfxImageEffectHandle effect, const std::string& words) {
     instance->gpu = words;
 }
 
+bool measures_gpu(OfxImageEffectHandle effect) {
+    const std::shared_ptr<Instance> instance = find(effect);
+    if (!instance) return false;
+    const std::lock_guard<std::mutex> lock(instance->mutex);
+    // A driver's first frame takes longer than the next ones.
+    constexpr unsigned kBegin = 3, kEach = 64;
+    const unsigned frame = instance->gpu_frames++;
+    return frame < kBegin || frame % kEach == 0;
+}
+
+void note_gpu_frame(OfxImageEffectHandle effect, const std::string& device,
+                    const std::string& time) {
+    const std::shared_ptr<Instance> instance = find(effect);
+    if (!instance) return;
+    const std::lock_guard<std::mutex> lock(instance->mutex);
+    if (!time.empty()) instance->gpu_time = time;
+    instance->gpu = "GPU: " + device;
+    if (!instance->gpu_time.empty()) instance->gpu += ", " + instance->gpu_time + " a frame";
+}
+
 void report(const Suites& suites, OfxImageEffectHandle effect, const std::string& problem) {
     const std::shared_ptr<Instance> instance = find(effect);
     if (!instance) {

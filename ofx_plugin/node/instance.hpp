@@ -18,6 +18,8 @@ struct Instance {
     bool rendered = false;
     std::optional<double> source_less_time;  ///< media frame minus time, at the last render
     std::string gpu;  ///< what drew the last render of a host that renders on a GPU; else empty
+    std::string gpu_time;     ///< what the kernel took for a frame when that was last measured
+    unsigned gpu_frames = 0;  ///< drawn by the kernel
 };
 
 /// The actions of an instance's life. They never fail: an instance renders even without its record.
@@ -35,6 +37,11 @@ void note_source_frame(OfxImageEffectHandle effect, OfxTime time,
 
 /// Stores what drew a render on a GPU, for the status.
 void note_gpu(OfxImageEffectHandle effect, const std::string& words);
+/// Counts a frame of the kernel. Its time is measured at some: a driver must then be waited for.
+bool measures_gpu(OfxImageEffectHandle effect);
+/// Stores that the kernel drew on a device, and what that took where it was measured.
+void note_gpu_frame(OfxImageEffectHandle effect, const std::string& device,
+                    const std::string& time);
 
 /// Shows a problem as the instance's persistent message, or clears the message when `problem` is
 /// empty. Allowed while rendering. Each render shows the problem again, because hosts clear

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <exception>
@@ -273,15 +274,18 @@ OfxStatus draw_there(const Suites& suites, OfxImageEffectHandle effect, const Pi
         const bool draws = plan.action == Action::kDraw;
         const NodeDrawing& drawing = draws ? plan.setup.drawing : kAsItIs;
         const Image* const in = plan.action == Action::kClear ? nullptr : &*pictures.in;
-        problem = draws && pictures.brush
-                      ? "the kernel lacks the brush"
-                      : draw_by_kernel(queue, in, pictures.out, window, drawing);
+        double took = 0;
+        const bool measures = draws && measures_gpu(effect);
+        problem = draws && pictures.brush ? "the kernel lacks the brush"
+                                          : draw_by_kernel(queue, in, pictures.out, window, drawing,
+                                                           measures ? &took : nullptr);
         if (problem.empty()) {
-            note_gpu(effect, "GPU: " + queue.device());
+            note_gpu_frame(effect, queue.device(), measures ? words_of_time(took) : "");
             if (plan.error) std::rethrow_exception(plan.error);
             return plan.status;
         }
     }
+    const auto start = std::chrono::steady_clock::now();
     Pictures copies = pictures;
     const HostCopy in(queue, pictures.in), brush(queue, pictures.brush);
     HostWindow out(queue, pictures.out, window);
@@ -289,7 +293,6 @@ OfxStatus draw_there(const Suites& suites, OfxImageEffectHandle effect, const Pi
     copies.in = in.image();
     copies.brush = brush.image();
     copies.out = out.image();
-    note_gpu(effect, "GPU: " + queue.device() + ", drawn on the processor and copied: " + problem);
     OfxStatus status = kOfxStatFailed;
     try {
         status = draw_here(suites, effect, copies, window, scale, plan);
@@ -297,7 +300,11 @@ OfxStatus draw_there(const Suites& suites, OfxImageEffectHandle effect, const Pi
         out.upload();
         throw;
     }
-    return out.upload() ? status : kOfxStatGPURenderFailed;
+    if (!out.upload()) return kOfxStatGPURenderFailed;
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+    note_gpu(effect, "GPU: " + queue.device() + ", drawn on the processor and copied in " +
+                         words_of_time(took.count()) + ": " + problem);
+    return status;
 }
 
 }  // namespace

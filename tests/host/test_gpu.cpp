@@ -2,25 +2,17 @@
 // processor where pocl is installed, and CUDA where there is a GPU. Without either these tests do
 // nothing, and say so.
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <iostream>
 #include <thread>
 
-#include "harness.hpp"
-#include "strict_gpu.hpp"
+#include "gpu_node.hpp"
 
 using namespace strict;
 using namespace test;
 
-namespace {
-
-/// Of *Exact*, in code values.
-constexpr double kPromise = 1e-4;
-
-/// The devices of this machine, each in a context of its own.
-std::vector<std::unique_ptr<Gpu>> gpus() {
+std::vector<std::unique_ptr<Gpu>> test::gpus() {
     Config config;
     config.gpus = true;
     Host::get().configure(config);
@@ -41,6 +33,8 @@ std::vector<std::unique_ptr<Gpu>> gpus() {
     return all;
 }
 
+namespace {
+
 /// What a host with GPUs can have: rows count upwards.
 std::vector<Layout> gpu_layouts() {
     std::vector<Layout> all;
@@ -50,62 +44,6 @@ std::vector<Layout> gpu_layouts() {
     }
     return all;
 }
-
-/// A node that draws a picture here and on a GPU.
-struct Both : Ready {
-    Gpu& gpu;
-    explicit Both(Gpu& on, const std::string& of = test::sidecar()) : Ready(of), gpu(on) {}
-    /// What is kept for a GPU goes with this action.
-    ~Both() {
-        instance.reset();
-        plugin.unload();
-    }
-    std::vector<unsigned char> draw(const Picture* source, const Layout& layout,
-                                    const OfxRectI& window, Gpu* on, double time = 3) {
-        Picture output(layout);
-        instance->gpu = on;
-        CHECK(instance->render(time, source, output, window) == kOfxStatOK);
-        instance->gpu = nullptr;
-        return output.pixels(window);
-    }
-    std::string status() {
-        CHECK(instance->changed("", "", kOfxChangeTime) == kOfxStatOK);
-        return instance->text("status");
-    }
-    bool by_kernel() {
-        const std::string text = status();
-        return text.find("GPU: " + gpu.device()) != std::string::npos &&
-               text.find("copied") == std::string::npos;
-    }
-    /// Both ways: near each other where the kernel draws, else equal.
-    void compare(const Picture& source, const OfxRectI& window, bool kernel) {
-        const Layout& layout = source.layout();
-        const auto here = draw(&source, layout, window, nullptr);
-        const auto there = draw(&source, layout, window, &gpu);
-        EXPECT(by_kernel() == kernel, status());
-        if (!kernel) {
-            CHECK(here == there);
-            return;
-        }
-        const auto a = floats(layout, here), b = floats(layout, there);
-        const auto from = floats(layout, source.pixels(window));
-        double worst = 0;
-        for (std::size_t i = 0; i < a.size(); ++i) {
-            if (std::memcmp(&a[i], &b[i], sizeof(float)) == 0) continue;
-            // Beyond that the closest colour is a matter of rounding here, too.
-            const float* const pixel = &from[i - i % 4];
-            if (std::any_of(pixel, pixel + 3, [](float c) { return std::abs(c) > 1e4f; })) {
-                CHECK(std::isfinite(b[i]));
-                continue;
-            }
-            EXPECT(std::memcmp(&a[i], &from[i], sizeof(float)) != 0, "an untouched number changed");
-            const double size = std::max(1.0, std::abs(static_cast<double>(a[i])));
-            const double error = std::abs(static_cast<double>(a[i]) - b[i]) / size;
-            worst = std::max(worst, std::isfinite(error) ? error : 1);
-        }
-        EXPECT(worst < kPromise, std::to_string(worst));
-    }
-};
 
 bool is_rgba_float(const Layout& layout) {
     return layout.channels == 4 && layout.depth == Depth::kFloat;
@@ -123,6 +61,52 @@ TEST(gpu_pictures_are_the_exact_ones) {
             node.compare(source, rect(b.x1 + 3, b.y1 + 5, b.x2 - 7, b.y2 - 2),
                          is_rgba_float(layout));
         }
+    }
+}
+
+TEST(gpu_rows_of_any_length) {
+    for (const auto& gpu : gpus()) {
+        Both node(*gpu);
+        Layout plain;
+        plain.bounds = rect(-5, 1, 32, 20);
+        const OfxRectI window = rect(-2, 3, 29, 18);
+        const Picture straight = source_of(plain);
+        const auto expected = node.draw(&straight, plain, window, nullptr);
+        const auto kernel = node.draw(&straight, plain, window, gpu.get());
+        for (const int padding : {4, 8, 60, 1, 2, 7}) {
+            Layout layout = plain;
+            layout.padding = padding;
+            const Picture source = source_of(layout);
+            const bool whole = padding % 4 == 0;
+            CHECK(node.draw(&source, layout, window, gpu.get()) == (whole ? kernel : expected));
+            EXPECT(node.by_kernel() == whole, node.status());
+        }
+    }
+}
+
+TEST(gpu_status_says_what_a_frame_takes) {
+    for (const auto& gpu : gpus()) {
+        Both node(*gpu);
+        const Picture source = source_of({});
+        const auto time = [&](const std::string& before, const std::string& after) {
+            const std::string text = node.status();
+            const std::size_t at = text.find(before), end = text.find(after, at + before.size());
+            EXPECT(at != std::string::npos && end != std::string::npos, text);
+            if (end == std::string::npos) return 0.0;
+            return std::stod(text.substr(at + before.size(), end - at - before.size()));
+        };
+        Layout large;
+        large.bounds = rect(0, 0, 640, 400);
+        const Picture picture = source_of(large);
+        for (int i = 0; i < 3; ++i) node.draw(&picture, large, large.bounds, gpu.get());
+        const double kernel = time("GPU: " + gpu->device() + ", ", " ms a frame");
+        CHECK(kernel < 10000);
+        // It stays until it is measured again.
+        for (int i = 0; i < 3; ++i) node.draw(&source, {}, Layout{}.bounds, gpu.get());
+        CHECK(time("GPU: " + gpu->device() + ", ", " ms a frame") == kernel);
+        node.set("gpu", 1);
+        node.draw(&picture, large, large.bounds, gpu.get());
+        CHECK(time("drawn on the processor and copied in ", " ms: GPU is Off") > 0);
     }
 }
 
