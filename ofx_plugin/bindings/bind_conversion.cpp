@@ -2,6 +2,9 @@
 #include <cstddef>
 #include <memory>
 #include <string>
+#include <variant>
+
+#include <pybind11/stl.h>
 
 #include "arrays.hpp"
 #include "binders.hpp"
@@ -35,6 +38,30 @@ DoubleArray converted(const py::array_t<double, py::array::c_style | py::array::
     return result;
 }
 
+py::dict step_members(const palette4d::ConversionStep& step) {
+    using namespace py::literals;
+    if (const auto* matrix = std::get_if<palette4d::MatrixStep>(&step)) {
+        return py::dict("kind"_a = "matrix", "matrix"_a = matrix->matrix,
+                        "offset"_a = matrix->offset);
+    }
+    if (const auto* log = std::get_if<palette4d::LogStep>(&step)) {
+        return py::dict("kind"_a = "log", "base"_a = log->base, "log_slope"_a = log->log_slope,
+                        "log_offset"_a = log->log_offset, "linear_slope"_a = log->linear_slope,
+                        "linear_offset"_a = log->linear_offset, "start"_a = log->start,
+                        "below"_a = log->below, "inverse"_a = log->inverse);
+    }
+    if (const auto* gamma = std::get_if<palette4d::GammaStep>(&step)) {
+        return py::dict("kind"_a = "gamma", "gamma"_a = gamma->gamma, "offset"_a = gamma->offset,
+                        "mirrored"_a = gamma->mirrored, "inverse"_a = gamma->inverse);
+    }
+    const auto& curve = std::get<palette4d::CurveStep>(step);
+    py::list curves;
+    for (const palette4d::SampledCurve& one : curve.curves) {
+        curves.append(py::make_tuple(one.x, one.y));
+    }
+    return py::dict("kind"_a = "curve", "curves"_a = curves, "inverse"_a = curve.inverse);
+}
+
 }  // namespace
 
 void bind_conversion(py::module_& module) {
@@ -47,6 +74,14 @@ void bind_conversion(py::module_& module) {
             py::arg("steps"), py::arg("name") = "<steps>",
             "Parses the JSON text of the steps. Raises SidecarError if they are invalid.")
         .def_property_readonly("identity", &ColourConversion::identity)
+        .def_property_readonly(
+            "members",
+            [](const ColourConversion& self) {
+                py::list steps;
+                for (const auto& step : self.steps()) steps.append(step_members(step));
+                return steps;
+            },
+            "The steps, each with its kind and numbers.")
         .def(
             "to_palette",
             [](const ColourConversion& self,

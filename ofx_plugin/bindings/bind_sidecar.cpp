@@ -7,6 +7,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -129,6 +130,21 @@ py::list stops_of(const NamedEdits& self) {
     return result;
 }
 
+py::dict still_mattes(const NamedEdits& self) {
+    using palette4d::MatteGrid;
+    py::dict result;
+    for (std::size_t i = 0; i < self.picks.size(); ++i) {
+        const palette4d::Pick& pick = self.picks[i];
+        if (!pick.enabled) continue;
+        const palette4d::StillMatte matte = palette4d::still_matte(self, pick);
+        const py::array_t<float> values(
+            {MatteGrid::kSaturations, MatteGrid::kSaturations, MatteGrid::kLightnesses},
+            matte.values.data());
+        result[py::int_(i)] = py::make_tuple(pick.hold, values, matte.shares, matte.first);
+    }
+    return result;
+}
+
 bool empty(const NamedEdits& self) {
     return std::none_of(self.vertex_rgb.begin(), self.vertex_rgb.end(),
                         [](const auto& rgb) { return rgb.has_value(); }) &&
@@ -225,7 +241,21 @@ void bind_sidecar(py::module_& module) {
                 const py::gil_scoped_release unlocked;
                 return palette4d::picks_at(self, frame);
             },
-            py::arg("frame"), "The picks and holds of a frame.");
+            py::arg("frame"), "The picks and holds of a frame.")
+        .def("still_mattes", &still_mattes,
+             "By the number of each enabled pick and hold: whether it is a hold, its matte where "
+             "it was picked, the shares of its 16 lightnesses, and the picked colour's point.")
+        .def(
+            "pick_moments",
+            [](const NamedEdits& self, double frame) {
+                std::vector<std::tuple<std::size_t, Vec3, double>> result;
+                for (const palette4d::PickMoment& one : palette4d::pick_moments(self, frame)) {
+                    result.emplace_back(one.pick, one.point, one.strength);
+                }
+                return result;
+            },
+            py::arg("frame"),
+            "Number, point and strength of what asks for something at a frame; picks first.");
 
     py::class_<BoundSidecar>(module, "Sidecar", "A validated sidecar file.")
         .def_property_readonly("clip", &clip_of)

@@ -7,6 +7,10 @@ namespace palette4d::gpu {
 const char* frame_text();
 /// What draws any frame of a clip's palette and edits, likewise.
 const char* clip_text();
+/// After that, what its picks and holds do.
+const char* clip_picks_text();
+/// After both, and the conversion's functions: a colour of the picture at a frame.
+const char* clip_main_text();
 
 const char* opencl_text();
 /// Compiled from cuda.cu by tools/make_ptx.py.

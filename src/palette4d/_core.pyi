@@ -60,6 +60,14 @@ class Edits:
         """Frames of enabled picks: their own, those of paths, and the ends of ranges and fades."""
     def picks_at(self, frame: float) -> FramePicks:
         """The picks and holds that ask for something at a frame."""
+    def still_mattes(self) -> dict[int, tuple[bool, F32, list[float], list[float]]]:
+        """What the mattes of enabled picks and holds are made from, by their numbers.
+
+        Whether it is a hold, its (96, 96, 16) matte where it was picked, the shares of its 16
+        lightnesses, and the picked colour's point.
+        """
+    def pick_moments(self, frame: float) -> list[tuple[int, list[float], float]]:
+        """Number, point and strength of what asks for something at a frame; picks first."""
 
 class ColourConversion:
     """A chain of matrices and curves; see docs/sidecar.md."""
@@ -68,6 +76,9 @@ class ColourConversion:
         """From the JSON text of the steps; SidecarError when they are no such chain."""
     @property
     def identity(self) -> bool: ...
+    @property
+    def members(self) -> list[dict[str, Any]]:
+        """The steps: kind ("matrix", "log", "gamma" or "curve") and its members; curves (x, y)."""
     def to_palette(self, colours: ArrayLike) -> F64:
         """(..., 3) clip numbers -> (..., 3) float64 palette numbers."""
     def to_clip(self, colours: ArrayLike) -> F64:
@@ -338,7 +349,7 @@ def luminance_weights(encoding: str) -> list[float]:
     """Return the weights of red, green and blue by an encoding's name; Rec.709's if unknown."""
 
 def kernel_text(part: str) -> str:
-    """Return the GPU kernel's text: 'frame', 'clip' or 'opencl'."""
+    """Return the GPU kernel's text: 'frame', 'clip', 'clip_picks', 'clip_main', 'opencl'."""
 
 def kernel_table(
     map: Recolourer,

@@ -196,6 +196,7 @@ def test_a_dctl_is_one_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     [
         (("--dctl", "a.dctl", "--every", "1"), "--dctl"),
         (("--dctl", "a.dctl", "--size", "9"), "--dctl"),
+        (("--every", "1", "-o", "luts", "--alpha"), "--dctl"),
         (("--every", "1"), "--output"),
         (("-o", "luts"), "--stops"),
     ],

@@ -13,6 +13,9 @@ static float _sqrtf(float x) { return std::sqrt(x); }
 static float _atan2f(float y, float x) { return std::atan2(y, x); }
 static float _fminf(float x, float y) { return std::fmin(x, y); }
 static float _fmaxf(float x, float y) { return std::fmax(x, y); }
+inline float _log2f(float x) { return std::log2(x); }
+inline float _exp2f(float x) { return std::exp2(x); }
+inline float _powf(float x, float y) { return std::pow(x, y); }
 static int TIMELINE_FRAME_INDEX = 0;
 #define FIRST_OF(value, ...) value
 #define DCTLUI_SLIDER_FLOAT float

@@ -6,14 +6,15 @@ import ctypes
 import json
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from opencl import run
-from palette4d.lut_export import dctl
+from palette4d.lut_export import clip_text, dctl
 from palette4d.lut_export.frame_edit import frame_edit
-from parity.cases import DOCUMENTS, Document, edited, pick, picked, split_merge_document
+from parity.cases import DOCUMENTS, Document, edited, split_merge_document
 from parity.kernel import compiler
 
 import palette4d
@@ -23,6 +24,10 @@ F32 = NDArray[np.float32]
 
 NAMES = ["changes-smooth", "changes-stops", "changes-hold", "flat-edited", "grey-edited",
          "colour-edited", "still-edited"]  # fmt: skip
+PICKS = ["still-picks", "still-holds", "still-learned", "colour-picks", "colour-curve",
+         "changes-picks", "changes-holds"]  # fmt: skip
+#: Golden sidecars whose clips are in another colour space than their palettes.
+CONVERTED = ["v1_every_step", "v1_scene_linear"]
 #: Of `render`, in code values.
 PROMISE = 1e-4
 
@@ -36,6 +41,10 @@ OPENCL_HOST = """
 #define _atan2f atan2
 #define _fminf fmin
 #define _fmaxf fmax
+#define _log2f log2
+#define _exp2f exp2
+#define _powf pow
+#define make_float4(x, y, z, w) (float4)(x, y, z, w)
 #define DEFINE_UI_PARAMS(name, label, kind, ...)
 #define p4d_strength 1.0f
 #define p4d_offset 0
@@ -43,7 +52,12 @@ OPENCL_HOST = """
 OPENCL_MAIN = """
 __kernel void draw(__global const float *in, __global float *out) {
     int i = 3 * (int)get_global_id(0);
+#ifdef ALPHA
+    float4 to = transform(1, 1, 0, 0, in[i], in[i + 1], in[i + 2], 0.25f);
+    if (to.w != 0.25f) to.x = 99.0f;
+#else
     float3 to = transform(1, 1, 0, 0, in[i], in[i + 1], in[i + 2]);
+#endif
     out[i] = to.x; out[i + 1] = to.y; out[i + 2] = to.z;
 }
 """
@@ -56,7 +70,7 @@ def colours() -> F32:
     return np.random.default_rng(8).uniform(-0.2, 1.2, (3000, 3)).astype(np.float32)
 
 
-def exported(document: Document, folder: Path, **options: str) -> tuple[Path, dctl.DctlExport]:
+def exported(document: Document, folder: Path, **options: Any) -> tuple[Path, dctl.DctlExport]:
     """The DCTL of a document."""
     source, output = folder / "shot.p4d.json", folder / "shot.dctl"
     source.write_text(json.dumps(document), encoding="utf-8")
@@ -66,7 +80,15 @@ def exported(document: Document, folder: Path, **options: str) -> tuple[Path, dc
 def exact(document: Document, frame: float, colours: F32) -> NDArray[np.float64]:
     """What `render` draws, in double."""
     sidecar = _core.parse_sidecar(json.dumps(document), "case")
-    return frame_edit(sidecar, frame).exact(colours)
+    steps = sidecar.conversion.steps if sidecar.conversion else None
+    return frame_edit(sidecar, frame, conversion=steps).exact(colours)
+
+
+def golden(name: str, repo_root: Path) -> Document:
+    """A golden sidecar."""
+    path = repo_root / "tests" / "golden" / "sidecars" / f"{name}.p4d.json"
+    document: Document = json.loads(path.read_text(encoding="utf-8"))
+    return document
 
 
 class Compiled:
@@ -103,13 +125,15 @@ def frames_of(document: Document) -> tuple[int, int]:
 
 
 @pytest.mark.parametrize("flags", [(), ("-ffast-math",)], ids=["exact", "fast-math"])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", NAMES + PICKS)
 def test_every_frame_is_as_rendered(
     name: str, flags: tuple[str, ...], colours: F32, tmp_path: Path
 ) -> None:
     document = DOCUMENTS[name]
     path, done = exported(document, tmp_path)
     compiled = Compiled(path, *flags)
+    if name in PICKS:
+        colours = colours[:800]
     first, last = frames_of(document)
     assert (done.first, done.last) == (first, last)
     changed = 0.0
@@ -117,21 +141,53 @@ def test_every_frame_is_as_rendered(
         # The timeline begins with 1 where the clip has its first frame.
         found = compiled.draw(frame - first + 1, colours)
         expected = exact(document, frame, colours)
-        assert np.abs(found - expected).max() < PROMISE
+        assert np.abs(found - expected).max() < PROMISE, frame
         changed = max(changed, float(np.abs(found - colours).max()))
     assert changed > 0.05
 
 
-@pytest.mark.parametrize("name", ["changes-smooth", "flat-edited"])
+@pytest.mark.parametrize("flags", [(), ("-ffast-math",)], ids=["exact", "fast-math"])
+@pytest.mark.parametrize("name", CONVERTED)
+def test_a_clip_in_another_colour_space_is_converted(
+    name: str, flags: tuple[str, ...], colours: F32, repo_root: Path, tmp_path: Path
+) -> None:
+    document = golden(name, repo_root)
+    vertex = document["polytope"]["vertices"][0]
+    moved = [0.7 * value + 0.1 for value in vertex["rgb"]]
+    document = edited(document, {vertex["id"]: (moved[0], moved[1], moved[2] + 0.2)}, [])
+    conversion = _core.parse_sidecar(json.dumps(document), "case").conversion
+    assert conversion is not None
+    steps = conversion.steps
+    colours = steps.to_clip(colours).astype(np.float32)
+    path, done = exported(document, tmp_path)
+    compiled = Compiled(path, *flags)
+    changed = 0.0
+    for frame in range(done.first, done.last + 1):
+        found = compiled.draw(frame - done.first + 1, colours)
+        expected = exact(document, frame, colours)
+        # In the palette's code values, in which the promise is.
+        in_palette = steps.to_palette(expected)
+        error = np.abs(steps.to_palette(found) - in_palette)
+        assert (error / np.maximum(np.abs(in_palette), 1)).max() < PROMISE
+        changed = max(changed, float(np.abs(expected - colours).max()))
+    assert changed > 0.01
+
+
+@pytest.mark.parametrize("alpha", [False, True])
+@pytest.mark.parametrize(
+    "name", ["changes-smooth", "flat-edited", "changes-picks", "still-learned"]
+)
 def test_it_runs_as_opencl_with_the_flags_of_resolve(
-    name: str, colours: F32, tmp_path: Path
+    name: str, alpha: bool, colours: F32, tmp_path: Path
 ) -> None:
     document = DOCUMENTS[name]
-    path, _ = exported(document, tmp_path)
+    path, _ = exported(document, tmp_path, alpha=alpha)
     first, last = frames_of(document)
     for frame in (first, (first + last) // 2, last):
         now = f"#define TIMELINE_FRAME_INDEX {frame - first + 1}\n"
         offset = OPENCL_HOST.replace("p4d_offset 0", f"p4d_offset {first - 1}")
+        if alpha:
+            now += "#define ALPHA\n#define DEFINE_DCTL_ALPHA_MODE_STRAIGHT\n"
         source = now + offset + path.read_text(encoding="ascii") + OPENCL_MAIN
         found = run(source, "draw", OPENCL_FLAGS, colours)
         assert np.abs(found - exact(document, frame, colours)).max() < PROMISE
@@ -182,13 +238,13 @@ def test_what_a_dctl_cannot_hold_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     document = DOCUMENTS["changes-smooth"]
-    with pytest.raises(Palette4dError, match=r"has no room for their mattes"):
-        exported(picked(document, [pick("red", (0.6, 0.3, 0.2), (0.4, 0.3, 0.6))]), tmp_path)
     with pytest.raises(Palette4dError, match=r"outside the clip"):
         exported(document, tmp_path, frames="12-400")
-    monkeypatch.setattr(dctl, "MOST_BYTES", 1000)
+    monkeypatch.setattr(clip_text, "MOST_BYTES", 1000)
     with pytest.raises(Palette4dError, match=r"room for 0 KB.*frames="):
         exported(document, tmp_path)
+    with pytest.raises(Palette4dError, match=r"KB.*switch picks off"):
+        exported(DOCUMENTS["still-pick"], tmp_path)
     with pytest.raises(Palette4dError, match=r"\.dctl"):
         palette4d.export_dctl(tmp_path / "shot.p4d.json", tmp_path / "shot.cube")
     assert not list(tmp_path.glob("*.dctl"))

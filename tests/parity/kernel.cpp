@@ -8,6 +8,7 @@
         body                   \
     };
 #define P4D_INT(x) static_cast<int>(x)
+#define P4D_FLOAT(x) static_cast<float>(x)
 #define P4D_TABLE const float *t_, [[maybe_unused]] const float *g_,
 #define P4D_PASS t_, g_,
 #define P4D_T(i) t_[i]

@@ -28,8 +28,8 @@ void set_around(FrameMatte& matte, const Vec3& point, float value) {
     }
 }
 
-/// A pick's matte at a frame, without holds.
-FrameMatte baked(const Pick& pick, const Vec3& from, const Vec3& to) {
+/// A pick's matte where it was picked, for all lightnesses.
+FrameMatte still_values(const Pick& pick) {
     float values[2 * Matte::kMiddle + 1];
     const double half = std::max(kSoft * pick.softness, 1e-3);
     const double low = std::max(kFirm - half, kLeast), high = kFirm + half;
@@ -41,6 +41,29 @@ FrameMatte baked(const Pick& pick, const Vec3& from, const Vec3& to) {
     FrameMatte still(MatteGrid::kSize);
     const std::vector<std::uint8_t>& odds = pick.taken().odds;
     for (std::size_t i = 0; i < still.size(); ++i) still[i] = values[odds[i]];
+    return still;
+}
+
+/// How much of the matte a pick's range of lightness takes.
+std::array<float, MatteGrid::kLightnesses> lightness_shares(const Pick& pick) {
+    std::array<float, MatteGrid::kLightnesses> shares{};
+    for (int l = 0; l < MatteGrid::kLightnesses; ++l) {
+        const double at = l / MatteGrid::kPerLightness;
+        double in = 1;
+        if (pick.darkest > 0) {
+            in = smooth_step(at, pick.darkest - kLightnessEnd, pick.darkest);
+        }
+        if (pick.lightest < 1) {
+            in *= 1 - smooth_step(at, pick.lightest, pick.lightest + kLightnessEnd);
+        }
+        shares[static_cast<std::size_t>(l)] = static_cast<float>(in);
+    }
+    return shares;
+}
+
+/// A pick's matte at a frame, without holds.
+FrameMatte baked(const Pick& pick, const Vec3& from, const Vec3& to) {
+    FrameMatte still = still_values(pick);
     const Vec3 away = to - from;
     if (pick_distance2(to, from) > 1e-10) {
         FrameMatte moved(MatteGrid::kSize);
@@ -62,19 +85,10 @@ FrameMatte baked(const Pick& pick, const Vec3& from, const Vec3& to) {
     // The picked colour itself is the thing's.
     set_around(still, to, 1);
     if (pick.darkest > 0 || pick.lightest < 1) {
-        for (int l = 0; l < MatteGrid::kLightnesses; ++l) {
-            const double at = l / MatteGrid::kPerLightness;
-            double in = 1;
-            if (pick.darkest > 0) {
-                in = smooth_step(at, pick.darkest - kLightnessEnd, pick.darkest);
-            }
-            if (pick.lightest < 1) {
-                in *= 1 - smooth_step(at, pick.lightest, pick.lightest + kLightnessEnd);
-            }
-            const auto share = static_cast<float>(in);
-            for (std::size_t i = static_cast<std::size_t>(l); i < still.size();
-                 i += MatteGrid::kLightnesses) {
-                still[i] *= share;
+        const auto shares = lightness_shares(pick);
+        for (std::size_t l = 0; l < shares.size(); ++l) {
+            for (std::size_t i = l; i < still.size(); i += MatteGrid::kLightnesses) {
+                still[i] *= shares[l];
             }
         }
     }
@@ -165,6 +179,22 @@ FramePicks matte_at(const Edits& edits, const std::string& id, double frame) {
                 hold ? std::vector<Held>() : held_at(moments(edits, frame, true));
             result.picks.push_back(frame_pick(moment, held, frame));
             result.picks.back().change = {1, 1, 1};
+        }
+    }
+    return result;
+}
+
+StillMatte still_matte(const Edits& edits, const Pick& pick) {
+    return {still_values(pick), lightness_shares(pick),
+            pick_point(displayed(pick.rgb, edits.display.get()))};
+}
+
+std::vector<PickMoment> pick_moments(const Edits& edits, double frame) {
+    std::vector<PickMoment> result;
+    for (const bool hold : {false, true}) {
+        for (const Moment& moment : moments(edits, frame, hold)) {
+            const auto index = static_cast<std::size_t>(moment.pick - edits.picks.data());
+            result.push_back({index, moment.point, moment.strength});
         }
     }
     return result;

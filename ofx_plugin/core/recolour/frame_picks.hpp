@@ -6,6 +6,7 @@
 // shadows, highlights, soft edges and noise change as much as they should.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -38,6 +39,22 @@ FramePicks picks_at(const Edits& edits, double frame);
 /// One pick's share of its change, 0..1, as a change of all channels; for its matte. Without a pick
 /// of this id, or where it asks for nothing, no colour changes.
 FramePicks matte_at(const Edits& edits, const std::string& id, double frame);
+
+/// What a matte is made from at any frame, for exports that make it themselves.
+struct StillMatte {
+    FrameMatte values;                                  ///< where the colour was picked
+    std::array<float, MatteGrid::kLightnesses> shares;  ///< by the range of lightness
+    Vec3 first;                                         ///< the picked colour's point
+};
+StillMatte still_matte(const Edits& edits, const Pick& pick);
+/// A pick or hold that asks for something at a frame: its number in Edits::picks, its point there
+/// and its strength. Picks first, in the order of picks_at().
+struct PickMoment {
+    std::size_t pick;
+    Vec3 point;
+    double strength;
+};
+std::vector<PickMoment> pick_moments(const Edits& edits, double frame);
 
 /// The memory that a PickPlan points to. `done` has what the palette does to each picked colour.
 template <class T>

@@ -2,6 +2,7 @@
 #define P4D_FN static __device__ __forceinline__
 #define P4D_STRUCT(name, body) struct name { body };
 #define P4D_INT(x) ((int)(x))
+#define P4D_FLOAT(x) ((float)(x))
 #define P4D_TABLE const float *__restrict__ t_, const float *__restrict__ g_,
 #define P4D_PASS t_, g_,
 #define P4D_T(i) t_[i]

@@ -3,6 +3,7 @@
 #define P4D_FN static
 #define P4D_STRUCT(name, body) typedef struct { body } name;
 #define P4D_INT(x) ((int)(x))
+#define P4D_FLOAT(x) ((float)(x))
 #define P4D_TABLE __constant const float *t_, __global const float *g_,
 #define P4D_PASS t_, g_,
 #define P4D_T(i) t_[i]

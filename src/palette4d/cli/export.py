@@ -25,7 +25,7 @@ again bakes only files that are missing or changed. Ctrl-C leaves whole files on
 --stops are the times of the colour stops, of the edited palette colours and of their neighbours.
 With a manifest each shot's files go to a folder of its name; --otio writes a copy of the edit whose
 clips name the shot's sidecar and files in their metadata ("palette4d").
---dctl writes the palette and its edits through time as one file for DaVinci Resolve, without LUTs.
+--dctl writes palette, edits and picks through time as one file for DaVinci Resolve, without LUTs.
 
 examples:
   palette4d export shot010.p4d.json --every 1 -o luts
@@ -44,7 +44,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         description="Bake the edit at many frames, a file each, in parallel, with an index.",
         epilog=EPILOG,
         usage="%(prog)s SIDECAR (--every N | --stops | --frames RANGE) -o DIR [options]\n"
-        "       %(prog)s SIDECAR --dctl OUT.dctl [--frames RANGE] [--force]",
+        "       %(prog)s SIDECAR --dctl OUT.dctl [--alpha] [--frames RANGE] [--force]",
         formatter_class=wide_help,
     )
     add = parser.add_argument
@@ -54,6 +54,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add("-o", "--output", metavar="DIR", type=Path, help="the folder for the files")
     dctl = "write one DCTL file instead"
     add("--dctl", metavar="OUT.dctl", type=Path, help=dctl)
+    alpha = "with --dctl: keep alpha, for DaVinci Resolve 19.1 and later"
+    add("--alpha", action="store_true", help=alpha)
     add("--name", metavar="NAME", help="the files' name (default: the clip's)")
     padding = "digits of the frame number in the names (default 4)"
     add("--padding", metavar="N", type=whole(0, 12), default=4, help=padding)
@@ -95,6 +97,8 @@ def run(args: argparse.Namespace) -> int:
     """Export; print the written files."""
     if args.dctl is not None:
         return _dctl(args)
+    if args.alpha:
+        args.parser.error("--alpha: only with --dctl")
     if args.output is None:
         args.parser.error("the following arguments are required: -o/--output")
     if args.every is None and not args.stops and args.frames is None:
@@ -140,12 +144,15 @@ def _dctl(args: argparse.Namespace) -> int:
     """Write a DCTL file; print its size."""
     from dataclasses import asdict
 
-    from palette4d.lut_export.dctl import MOST_BYTES, export_dctl
+    from palette4d.lut_export.clip_text import MOST_BYTES
+    from palette4d.lut_export.dctl import export_dctl
 
     others = ("output", "every", "otio", "name", "clip", "size")
     if args.stops or any(getattr(args, name) is not None for name in others):
-        args.parser.error("--dctl: only with --frames, --force, --json and --quiet")
-    done = export_dctl(args.sidecar, args.dctl, frames=args.frames, force=args.force)
+        args.parser.error("--dctl: only with --alpha, --frames, --force, --json and --quiet")
+    done = export_dctl(
+        args.sidecar, args.dctl, frames=args.frames, alpha=args.alpha, force=args.force
+    )
     if args.json:
         print(json.dumps(asdict(done), indent=2))
     elif not args.quiet:
