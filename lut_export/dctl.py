@@ -58,8 +58,8 @@ __DEVICE__ float4 transform(int p_Width, int p_Height, int p_X, int p_Y, float p
 
 
 @dataclass(frozen=True)
-class DctlExport:
-    """The DCTL file that was written.
+class ClipExport:
+    """The file that was written.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ def export_dctl(
     frames: str | None = None,
     alpha: bool = False,
     force: bool = False,
-) -> DctlExport:
+) -> ClipExport:
     """Write a sidecar's palette, edits, picks and ramps as a DCTL file for DaVinci Resolve.
 
     Parameters
@@ -105,7 +105,7 @@ def export_dctl(
 
     Returns
     -------
-    DctlExport
+    ClipExport
         What was written. The result is within 1e-4 of `render` at every frame.
 
     Raises
@@ -119,14 +119,10 @@ def export_dctl(
     if output.suffix.lower() != ".dctl":
         raise Palette4dError(f"{output}: found no extension .dctl; name the file NAME.dctl")
     refuse_existing(output, force)
-    sidecar = (
-        source.grade.core
-        if isinstance(source, Document)
-        else _core.parse_sidecar(sidecars.read_bytes(source), os.fspath(source))
-    )
+    sidecar = source_of(source)
     clip = clip_text(sidecar, frames, output)
     text = _TEXT.format(
-        name=" ".join(printable(str(sidecar.clip["name"])).split()),
+        name=one_line(sidecar),
         first=clip.first,
         last=clip.last,
         version=_core.__version__,
@@ -140,7 +136,19 @@ def export_dctl(
     )
     with replacing(output, force=force) as temporary:
         temporary.write_text(text, encoding="ascii", errors="replace", newline="\n")
-    return DctlExport(str(output), clip.first, clip.last, clip.keys, clip.size)
+    return ClipExport(str(output), clip.first, clip.last, clip.keys, clip.size)
+
+
+def source_of(source: str | os.PathLike[str] | Document) -> _core.Sidecar:
+    """Return the sidecar of a path or a document."""
+    if isinstance(source, Document):
+        return source.grade.core
+    return _core.parse_sidecar(sidecars.read_bytes(source), os.fspath(source))
+
+
+def one_line(sidecar: _core.Sidecar) -> str:
+    """Return the clip's name for a comment."""
+    return " ".join(printable(str(sidecar.clip["name"])).split())
 
 
 def arrays_text(clip: ClipText, form: str) -> str:

@@ -27,6 +27,7 @@ PUBLIC = {
     "config",
     "export",
     "export_dctl",
+    "export_glsl",
     "install_plugin",
     "load",
     "open_clip",

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from palette4d.hosts.install import install_plugin
     from palette4d.lut_export.bake import bake
     from palette4d.lut_export.dctl import export_dctl
+    from palette4d.lut_export.glsl import export_glsl
     from palette4d.media.clip import Clip, open_clip
     from palette4d.plotting import plot
     from palette4d.shows.analysis import analyze_shots
@@ -47,6 +48,7 @@ __all__ = [
     "config",
     "export",
     "export_dctl",
+    "export_glsl",
     "install_plugin",
     "load",
     "open_clip",
@@ -64,6 +66,7 @@ _HOMES = {
     "config": "palette4d.shows.exports",
     "export": "palette4d.shows.exports",
     "export_dctl": "palette4d.lut_export.dctl",
+    "export_glsl": "palette4d.lut_export.glsl",
     "install_plugin": "palette4d.hosts.install",
     "open_clip": "palette4d.media.clip",
     "plot": "palette4d.plotting",

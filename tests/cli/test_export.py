@@ -181,6 +181,14 @@ def dctl(*words: object) -> int:
     return main(["export", str(EDITED), *map(str, words)])
 
 
+def test_glsl_is_one_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("shot.glsl", "shot.hook"):
+        assert dctl("--glsl", tmp_path / name, "--frames", "2-5") == 0
+        assert "frames 2 to 5 from " in capsys.readouterr().out
+    assert dctl("--glsl", tmp_path / "shot.txt") == 1
+    assert "NAME.hook" in capsys.readouterr().err
+
+
 def test_a_dctl_is_one_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / "shot.dctl"
     assert dctl("--dctl", output) == 0
@@ -196,6 +204,7 @@ def test_a_dctl_is_one_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     [
         (("--dctl", "a.dctl", "--every", "1"), "--dctl"),
         (("--dctl", "a.dctl", "--size", "9"), "--dctl"),
+        (("--dctl", "a.dctl", "--glsl", "a.glsl"), "--glsl"),
         (("--every", "1", "-o", "luts", "--alpha"), "--dctl"),
         (("--every", "1"), "--output"),
         (("-o", "luts"), "--stops"),

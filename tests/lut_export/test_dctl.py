@@ -13,12 +13,12 @@ import pytest
 from numpy.typing import NDArray
 from opencl import run
 from palette4d.lut_export import clip_text, dctl
-from palette4d.lut_export.frame_edit import frame_edit
 from parity.cases import DOCUMENTS, Document, edited, split_merge_document
 from parity.kernel import compiler
+from whole_clips import CONVERTED, PROMISE, converted, exact
 
 import palette4d
-from palette4d import Palette4dError, _core
+from palette4d import Palette4dError
 
 F32 = NDArray[np.float32]
 
@@ -26,10 +26,6 @@ NAMES = ["changes-smooth", "changes-stops", "changes-hold", "flat-edited", "grey
          "colour-edited", "still-edited"]  # fmt: skip
 PICKS = ["still-picks", "still-holds", "still-learned", "colour-picks", "colour-curve",
          "changes-picks", "changes-holds"]  # fmt: skip
-#: Golden sidecars whose clips are in another colour space than their palettes.
-CONVERTED = ["v1_every_step", "v1_scene_linear"]
-#: Of `render`, in code values.
-PROMISE = 1e-4
 
 #: What Resolve puts before a DCTL for OpenCL, and the flags that it builds with.
 OPENCL_HOST = """
@@ -70,25 +66,11 @@ def colours() -> F32:
     return np.random.default_rng(8).uniform(-0.2, 1.2, (3000, 3)).astype(np.float32)
 
 
-def exported(document: Document, folder: Path, **options: Any) -> tuple[Path, dctl.DctlExport]:
+def exported(document: Document, folder: Path, **options: Any) -> tuple[Path, dctl.ClipExport]:
     """The DCTL of a document."""
     source, output = folder / "shot.p4d.json", folder / "shot.dctl"
     source.write_text(json.dumps(document), encoding="utf-8")
     return output, palette4d.export_dctl(source, output, force=True, **options)
-
-
-def exact(document: Document, frame: float, colours: F32) -> NDArray[np.float64]:
-    """What `render` draws, in double."""
-    sidecar = _core.parse_sidecar(json.dumps(document), "case")
-    steps = sidecar.conversion.steps if sidecar.conversion else None
-    return frame_edit(sidecar, frame, conversion=steps).exact(colours)
-
-
-def golden(name: str, repo_root: Path) -> Document:
-    """A golden sidecar."""
-    path = repo_root / "tests" / "golden" / "sidecars" / f"{name}.p4d.json"
-    document: Document = json.loads(path.read_text(encoding="utf-8"))
-    return document
 
 
 class Compiled:
@@ -151,13 +133,7 @@ def test_every_frame_is_as_rendered(
 def test_a_clip_in_another_colour_space_is_converted(
     name: str, flags: tuple[str, ...], colours: F32, repo_root: Path, tmp_path: Path
 ) -> None:
-    document = golden(name, repo_root)
-    vertex = document["polytope"]["vertices"][0]
-    moved = [0.7 * value + 0.1 for value in vertex["rgb"]]
-    document = edited(document, {vertex["id"]: (moved[0], moved[1], moved[2] + 0.2)}, [])
-    conversion = _core.parse_sidecar(json.dumps(document), "case").conversion
-    assert conversion is not None
-    steps = conversion.steps
+    document, steps = converted(name, repo_root)
     colours = steps.to_clip(colours).astype(np.float32)
     path, done = exported(document, tmp_path)
     compiled = Compiled(path, *flags)

@@ -25,7 +25,8 @@ again bakes only files that are missing or changed. Ctrl-C leaves whole files on
 --stops are the times of the colour stops, of the edited palette colours and of their neighbours.
 With a manifest each shot's files go to a folder of its name; --otio writes a copy of the edit whose
 clips name the shot's sidecar and files in their metadata ("palette4d").
---dctl writes palette, edits and picks through time as one file for DaVinci Resolve, without LUTs.
+--dctl writes palette, edits and picks through time as one file for DaVinci Resolve, without LUTs;
+--glsl the same as a fragment function (NAME.glsl) or as a shader for mpv (NAME.hook).
 
 examples:
   palette4d export shot010.p4d.json --every 1 -o luts
@@ -33,6 +34,7 @@ examples:
   palette4d export shots/edit.shots.json --stops -o luts --otio edit_luts.otio
   palette4d export shots/edit.shots.json --stops -o cdls --format ccc --ccc show.ccc
   palette4d export shot010.p4d.json --dctl shot010.dctl
+  palette4d export shot010.p4d.json --glsl shot010.hook
 """
 
 
@@ -44,7 +46,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         description="Bake the edit at many frames, a file each, in parallel, with an index.",
         epilog=EPILOG,
         usage="%(prog)s SIDECAR (--every N | --stops | --frames RANGE) -o DIR [options]\n"
-        "       %(prog)s SIDECAR --dctl OUT.dctl [--alpha] [--frames RANGE] [--force]",
+        "       %(prog)s SIDECAR (--dctl OUT.dctl [--alpha] | --glsl OUT.glsl) [--frames RANGE]",
         formatter_class=wide_help,
     )
     add = parser.add_argument
@@ -54,6 +56,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add("-o", "--output", metavar="DIR", type=Path, help="the folder for the files")
     dctl = "write one DCTL file instead"
     add("--dctl", metavar="OUT.dctl", type=Path, help=dctl)
+    glsl = "write GLSL instead: OUT.glsl, or OUT.hook for mpv"
+    add("--glsl", metavar="OUT.glsl", type=Path, help=glsl)
     alpha = "with --dctl: keep alpha, for DaVinci Resolve 19.1 and later"
     add("--alpha", action="store_true", help=alpha)
     add("--name", metavar="NAME", help="the files' name (default: the clip's)")
@@ -95,8 +99,8 @@ def export_settings(args: argparse.Namespace) -> dict[str, Any]:
 
 def run(args: argparse.Namespace) -> int:
     """Export; print the written files."""
-    if args.dctl is not None:
-        return _dctl(args)
+    if args.dctl is not None or args.glsl is not None:
+        return _one_file(args)
     if args.alpha:
         args.parser.error("--alpha: only with --dctl")
     if args.output is None:
@@ -140,19 +144,26 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _dctl(args: argparse.Namespace) -> int:
-    """Write a DCTL file; print its size."""
+def _one_file(args: argparse.Namespace) -> int:
+    """Write a DCTL or GLSL file; print its size."""
     from dataclasses import asdict
 
     from palette4d.lut_export.clip_text import MOST_BYTES
     from palette4d.lut_export.dctl import export_dctl
+    from palette4d.lut_export.glsl import export_glsl
 
+    name = "--glsl" if args.dctl is None else "--dctl"
     others = ("output", "every", "otio", "name", "clip", "size")
-    if args.stops or any(getattr(args, name) is not None for name in others):
-        args.parser.error("--dctl: only with --alpha, --frames, --force, --json and --quiet")
-    done = export_dctl(
-        args.sidecar, args.dctl, frames=args.frames, alpha=args.alpha, force=args.force
-    )
+    if args.stops or any(getattr(args, other) is not None for other in others):
+        args.parser.error(f"{name}: only with --frames, --force, --json and --quiet")
+    if args.glsl is None:
+        done = export_dctl(
+            args.sidecar, args.dctl, frames=args.frames, alpha=args.alpha, force=args.force
+        )
+    elif args.dctl is not None or args.alpha:
+        args.parser.error("--glsl: not with --dctl or --alpha")
+    else:
+        done = export_glsl(args.sidecar, args.glsl, frames=args.frames, force=args.force)
     if args.json:
         print(json.dumps(asdict(done), indent=2))
     elif not args.quiet:
