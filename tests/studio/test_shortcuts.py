@@ -70,6 +70,10 @@ def test_the_table_is_searched_by_action_and_key(opened: Window) -> None:
     dialog.search.setText("ctrl+s")
     assert "Save" in seen()
     assert len(seen()) < len(everything)
+    dialog.choose("window.save")
+    assert dialog.fields[0].isEnabled()
+    dialog.search.setText("wipe")
+    assert not dialog.fields[0].isEnabled()  # its row is not seen any more
 
 
 def test_arrows_move_a_cross_that_picks(opened: Window, settle: Settle, qtbot: Any) -> None:

@@ -195,6 +195,8 @@ class ShortcutsDialog(QDialog):
         for item in self.items():
             words = " ".join(item.text(column) for column in range(3)).lower()
             item.setHidden(text.lower() not in words)
+        if self.chosen is None:  # a hidden row is not selected
+            self._show_chosen()
 
     def _show_keys(self) -> None:
         for item in self.items():
