@@ -152,6 +152,14 @@ public:
         check(cu_.get<int(STRICT_API*)(Handle)>("cuStreamSynchronize")(stream_),
               "cuStreamSynchronize");
     }
+    bool pin(void* bytes, std::size_t count) override {
+        use();
+        return cu_.get<int(STRICT_API*)(void*, std::size_t, unsigned)>("cuMemHostRegister_v2")(
+                   bytes, count, 0) == 0;
+    }
+    void unpin(void* bytes) override {
+        cu_.get<int(STRICT_API*)(void*)>("cuMemHostUnregister")(bytes);
+    }
     void describe(OfxPropertySetStruct& arguments) const override {
         arguments.put("OfxImageEffectPropCudaEnabled", 1);
         if (stream_) arguments.put("OfxImageEffectPropCudaStream", stream_);

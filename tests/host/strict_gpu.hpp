@@ -21,6 +21,10 @@ public:
     virtual void download(void* memory, void* to, std::size_t count) = 0;
     virtual void release(void* memory) = 0;
     virtual void finish() = 0;
+    /// Keeps memory of the process where the device reads it, for quicker copies, until unpin().
+    /// False: not in this system.
+    virtual bool pin(void*, std::size_t) { return false; }
+    virtual void unpin(void*) {}
     /// What a render's arguments say.
     virtual void describe(OfxPropertySetStruct& arguments) const = 0;
 };
