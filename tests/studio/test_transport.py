@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 from palette4d.studio.window import Window
@@ -36,3 +39,32 @@ def test_the_bar_never_lies_over_the_picture(opened: Window, qtbot: Any) -> None
         qtbot.waitUntil(lambda: bar.y() > viewer.geometry().bottom())
         seen = [*bar.compare.values(), bar.look, bar.exposure]
         assert all(bar.rect().contains(widget.geometry()) for widget in seen)
+
+
+#: Tells where the rows of tabs are seen in a window that is drawn by the command.
+TABS = """
+import sys
+from pathlib import Path
+from PySide6.QtWidgets import QTabBar
+from palette4d.studio import app
+
+def tell(window):
+    for bar in window.findChildren(QTabBar):
+        if bar.isVisible() and window.rect().intersects(bar.geometry()):
+            print(bar.geometry().x(), bar.count())
+
+app.run(None, screenshot=Path(sys.argv[1]), size=(1000, 600), prepare=tell)
+"""
+
+
+def test_each_row_of_tabs_is_drawn_once(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", TABS, str(tmp_path / "window.png")],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    rows = sorted(done.stdout.split("\n")[:-1])
+    assert len(rows) == 2, rows
+    assert len({row.split()[0] for row in rows}) == 1, rows

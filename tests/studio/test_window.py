@@ -124,7 +124,7 @@ def test_a_locked_colour_that_is_changed_by_hand_is_said(opened: Window) -> None
     opened.session.edit(lambda document: document.lock(id_), "locked")
     assert opened.session.status.text == "locked"
     opened.session.edit(lambda document: document.set(id_, rgb=(0.3, 0.2, 0.1)), "set it")
-    assert opened.session.status.text == f"set it; locked against picks, changed by hand: {id_}"
+    assert opened.session.status.text == f"set it; {texts.LOCKED_MOVED.format(ids=id_)}"
     opened.session.undo()
     assert opened.session.status.text == texts.UNDONE
 

@@ -244,18 +244,21 @@ class Window(QMainWindow):
             "timeline": self._dock(texts.TIMELINE, self.timeline, area.BottomDockWidgetArea),
             "shots": self._dock(texts.SHOTS, self.shots, area.LeftDockWidgetArea),
         }
+        for dock in self.docks.values():  # Qt draws the tabs of layouts on the way to the last one
+            dock.hide()
         self.tabifyDockWidget(self.docks["inspector"], self.docks["history"])
         self.tabifyDockWidget(self.docks["history"], self.docks["versions"])
         self.docks["versions"].visibilityChanged.connect(
             lambda _: self.turns.later(self.gallery.refresh)
         )
-        self.docks["inspector"].raise_()
         self.tabifyDockWidget(self.docks["solid"], self.docks["scopes"])
-        self.docks["solid"].raise_()
         self.docks["scopes"].visibilityChanged.connect(
             lambda _: self.turns.later(self.scopes.follow)  # when it is where it will be
         )
-        self.docks["shots"].hide()
+        for name, dock in self.docks.items():
+            dock.setVisible(name != "shots")
+        self.docks["inspector"].raise_()
+        self.docks["solid"].raise_()
         # The timeline needs no title: it is told by what it shows.
         self.docks["timeline"].setTitleBarWidget(QWidget())
 
