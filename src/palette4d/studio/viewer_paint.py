@@ -17,6 +17,7 @@ from PySide6.QtGui import (
     QPainterPath,
     QPainterPathStroker,
     QPen,
+    QRegion,
 )
 
 from palette4d.grade.picks import Pick
@@ -46,7 +47,8 @@ class ViewerPainter:
     def paint(self) -> None:
         """Draw all."""
         painter = QPainter(self.viewer)
-        painter.fillRect(self.viewer.rect(), QColor(theme.PIT))
+        for rim in QRegion(self.viewer.rect()).subtracted(self._covered()):
+            painter.fillRect(rim, QColor(theme.PIT))
         if self.session.clip is None:
             if self.session.document is not None:
                 self._say(painter, texts.NO_PICTURE)
@@ -80,6 +82,16 @@ class ViewerPainter:
             _ring(painter, lambda: painter.drawRect(frame))
         self._draw_probe(painter)
         self._draw_legend(painter)
+
+    def _covered(self) -> QRegion:
+        """Return what pictures cover."""
+        covered = QRegion()
+        if self.session.clip is None or self.viewer.problem or not self.viewer.images:
+            return covered
+        for _, pane in self.viewer.panes():
+            box = (self._target(pane) & pane).toAlignedRect()
+            covered += QRegion(box.adjusted(1, 1, -1, -1))  # its edges are not whole pixels
+        return covered
 
     def _target(self, pane: QRectF) -> QRectF:
         assert self.viewer.picture is not None
