@@ -47,8 +47,9 @@ class ViewerPainter:
     def paint(self) -> None:
         """Draw all."""
         painter = QPainter(self.viewer)
-        for rim in QRegion(self.viewer.rect()).subtracted(self._covered()):
-            painter.fillRect(rim, QColor(theme.PIT))
+        painter.setClipRegion(QRegion(self.viewer.rect()).subtracted(self._covered()))
+        painter.fillRect(self.viewer.rect(), QColor(theme.PIT))
+        painter.setClipping(False)
         if self.session.clip is None:
             if self.session.document is not None:
                 self._say(painter, texts.NO_PICTURE)
