@@ -47,6 +47,8 @@ def killed(sidecar: Path, seed: int) -> tuple[list[tuple[str, int, Any, float]],
     def listen() -> None:
         assert child.stdout is not None
         for line in child.stdout:
+            if not line.endswith("\n"):
+                continue  # it died while it wrote
             word, number, *more = line.split(maxsplit=2)
             said.append(
                 (word, int(number), json.loads(more[0]) if more else None, time.monotonic())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import shutil
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -137,19 +138,22 @@ def test_a_late_picture_of_an_older_drag_is_not_shown(
 
 
 def test_a_click_before_its_frame_is_read_is_done_when_it_is(
-    window: Window, sidecar: Path, qtbot: Any
+    window: Window, sidecar: Path, qtbot: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    go_on, read = threading.Event(), player.Player.read
+    monkeypatch.setattr(
+        player.Player, "read", lambda self, number: read(self, number) if go_on.wait(20) else None
+    )
     window.open_path(str(sidecar))
     session, viewer = window.session, window.viewer
-    assert session.player is not None
-    while session.player.frame(session.frame) is not None:  # else it was read at once
-        session.go(session.frame + 1)
     QTest.mouseClick(viewer, Qt.MouseButton.LeftButton, pos=viewer.rect().center())
     assert session.place is None
+    go_on.set()
     qtbot.waitUntil(lambda: session.place is not None, timeout=20_000)
     # Another frame has another picture: there the click is not done.
     session.select()
     frame = session.frame
+    assert session.player is not None
     session.player.close()
     session.player._frames.clear()
     QTest.mouseClick(viewer, Qt.MouseButton.LeftButton, pos=viewer.rect().center())
