@@ -126,16 +126,24 @@ void add_frame(Densities& all, const View& view, const Parts& parts, double weig
     histograms.add(all.part, counts * weight, parts.band, false, &parts.wanted);
 }
 
-Grid held_back(const Vec3& picked, const std::vector<Vec3>& holds, const DisplayCurve* display) {
+/// What holds leave of a pick, and of those of its parts that have a colour of their own.
+Grid held_back(const Vec3& picked, const std::vector<View>& views, const std::vector<Vec3>& holds,
+               const DisplayCurve* display) {
     Grid left(MatteGrid::kSize, 1.0f);
-    const Vec3 own = pick_point(displayed(picked, display));
+    std::vector<Vec3> parts{pick_point(displayed(picked, display))};
+    for (const View& view : views) {
+        parts.insert(parts.end(), view.areas.begin(), view.areas.end());
+    }
     for (const Vec3& hold : holds) {
         const Vec3 held = pick_point(displayed(hold, display));
         std::size_t at = 0;
         for (int u = 0; u < MatteGrid::kSaturations; ++u) {
             for (int v = 0; v < MatteGrid::kSaturations; ++v) {
                 for (int l = 0; l < MatteGrid::kLightnesses; ++l) {
-                    left[at++] *= static_cast<float>(spared(MatteGrid::point(u, v, l), held, own));
+                    const Vec3 node = MatteGrid::point(u, v, l);
+                    double most = 0;
+                    for (const Vec3& part : parts) most = std::max(most, spared(node, held, part));
+                    left[at++] *= static_cast<float>(most);
                 }
             }
         }
@@ -151,7 +159,7 @@ LearnedMatte learn_matte(const std::vector<LearningFrame>& frames, const Vec3& p
     std::vector<View> views;
     for (const LearningFrame& frame : frames) views.push_back(reduced(frame, picked, display));
     const Grid hue = hue_grid(displayed(picked, display));
-    const Grid left = held_back(picked, holds, display);
+    const Grid left = held_back(picked, views, holds, display);
     LearnedMatte learned;
     Grid membership(MatteGrid::kSize), sure;
     for (std::size_t i = 0; i < membership.size(); ++i) membership[i] = hue[i] * left[i];

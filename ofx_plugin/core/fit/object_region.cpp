@@ -158,10 +158,11 @@ void grow_other(const View& view, Mask& marked, const Vec3& pick) {
 }
 
 /// A part of the object that has another colour than the pick takes what has its hue and shade.
-void grow_object(const View& view, Mask& marked, const Vec3& pick) {
+void grow_object(View& view, Mask& marked, const Vec3& pick) {
     grow(view, marked, [&](const Vec3& shown) {
         const Vec3 own = pick_point(shown);
         const bool other = pick_distance2(own, pick) >= kNear * kNear;
+        if (other) view.areas.push_back(own);
         return [&view, other, shown, amount = PickedColour(shown),
                 hue = hue_grid(shown)](std::size_t i) {
             if (!other || view.other[i]) return false;

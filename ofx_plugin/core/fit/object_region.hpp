@@ -22,6 +22,7 @@ struct View {
     Mask real;                   ///< has a colour
     Image amount, grows;
     Mask seed, other;
+    std::vector<Vec3> areas;  ///< points of the object's parts that have another colour
     bool seeded = false;
     std::vector<std::uint32_t> node;  ///< the nearest node
 

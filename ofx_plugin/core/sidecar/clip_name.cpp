@@ -30,8 +30,9 @@ CodePoint code_point(const std::string& text, std::size_t at) {
         if ((byte(at + i) & 0xc0u) != 0x80) return {};
         value = value << 6 | (byte(at + i) & 0x3fu);
     }
-    constexpr std::uint32_t kLeast[] = {0, 0x80, 0x800, 0x10000};
-    if (value < kLeast[more] || value > 0x10ffff || (value >= 0xd800 && value < 0xe000)) return {};
+    constexpr std::uint32_t kSmallest[] = {0, 0x80, 0x800, 0x10000};
+    if (value < kSmallest[more] || value > 0x10ffff || (value >= 0xd800 && value < 0xe000))
+        return {};
     return {value, more + 1};
 }
 

@@ -189,6 +189,19 @@ TEST(held_colours_are_left_out) {
     CHECK(membership(held, kShirt) > 0.9);
 }
 
+TEST(an_area_wins_over_a_hold_of_a_farther_colour) {
+    Frame scene(320, 180, kWall);
+    scene.square(40, 40, 100, 4, kShirt);
+    const Vec3 worn{0.58, 0.42, 0.3}, hair{0.55, 0.44, 0.28};
+    scene.square(200, 40, 60, 4, worn);
+    scene.add_noise(7, 0.005);
+    const std::vector<Brush> one = {{{{70, 90}}, 5}}, both = {{{{70, 90}}, 5}, {{{230, 70}}, 5}};
+    const LearnedMatte without = learn_matte({scene.frame(kShirt, one)}, kShirt, {hair}, nullptr),
+                       with = learn_matte({scene.frame(kShirt, both)}, kShirt, {hair}, nullptr);
+    CHECK(membership(without, worn) < 0.1 && membership(with, worn) > 0.5);
+    CHECK(membership(with, hair) < 0.5 * membership(with, worn));
+}
+
 TEST(other_frames_add_what_they_show) {
     const Frame first = shirt();
     // Later a car has the shirt's colour nearly, and the shirt has moved.
