@@ -139,10 +139,10 @@ def run_version(args: argparse.Namespace) -> int:
         document.remove_version(args.name)
         text = f"version {args.name}: removed; `undo` brings it back"
     elif args.what == "rename":
-        document.rename_version(args.name, args.new)
+        document.change_version(args.name, rename=args.new)
         text = f"version {args.name}: its name is {args.new} now"
     elif args.what == "note":
-        document.set_note(args.name, args.text)
+        document.change_version(args.name, note=args.text)
         text = f"version {args.name}: the note is {'kept' if args.text.strip() else 'removed'}"
     else:
         kept = document.use_version(args.name)

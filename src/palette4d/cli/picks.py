@@ -331,7 +331,7 @@ def run_switch(args: argparse.Namespace) -> int:
 def run_lock(args: argparse.Namespace) -> int:
     """Lock or unlock handles."""
     document = load(args.sidecar)
-    (document.lock if args.action == "lock" else document.unlock)(*args.ids)
+    document.lock(*args.ids, locked=args.action == "lock")
     document.save()
     print(f"{args.action}ed: {', '.join(map(document.grade.named, dict.fromkeys(args.ids)))}")
     return 0

@@ -281,15 +281,12 @@ class Document:
         """
         self._take(handle_edits.set_ramp(self.grade, ramp, id))
 
-    def lock(self, *ids: str) -> None:
-        """Keep vertices and stops where they are: moves of tracks and of the palette leave them."""
-        self._take(handle_edits.lock(self.grade, *ids))
+    def lock(self, *ids: str, locked: bool = True) -> None:
+        """Keep vertices and stops where they are: moves of tracks and of the palette leave them.
 
-    def unlock(self, *ids: str) -> None:
-        """Let tracks and the palette move these vertices and stops again."""
-        self._take(handle_edits.unlock(self.grade, *ids))
-
-    # -------------------------------------------------------------------------------------- picks
+        `locked` False lets them move again.
+        """
+        self._take((handle_edits.lock if locked else handle_edits.unlock)(self.grade, *ids))
 
     def pick(
         self,
@@ -435,22 +432,29 @@ class Document:
         """Remove a version; `undo` brings it back."""
         self._take(versions.remove_version(self.grade, name))
 
-    def rename_version(self, name: str, new: str) -> None:
-        """Give a version a name that no version has.
+    def change_version(
+        self, name: str, *, rename: str | None = None, note: str | None = None
+    ) -> None:
+        """Give a version a name that no version has, or a note; each is a step.
+
+        Parameters
+        ----------
+        name : str
+            The version.
+        rename : str, optional
+            Its new name.
+        note : str, optional
+            One line of at most 300 characters; "" removes it. `grade.note` has it.
 
         Raises
         ------
         Palette4dError
             There is no such version, or another one has the new name.
         """
-        self._take(versions.rename_version(self.grade, name, new))
-
-    def set_note(self, name: str, note: str) -> None:
-        """Say something about a version, in one line of at most 300 characters; "" removes it.
-
-        `grade.note` has it.
-        """
-        self._take(versions.set_note(self.grade, name, note))
+        if note is not None:
+            self._take(versions.set_note(self.grade, name, note))
+        if rename is not None:
+            self._take(versions.rename_version(self.grade, name, rename))
 
     def copy_from(
         self,

@@ -59,7 +59,7 @@ def remove(session: Session, ids: list[str]) -> None:
 
     def change(document: Document, clip: OfClip | None) -> None:
         if locks:
-            document.unlock(*locks)
+            document.lock(*locks, locked=False)
         if picks:
             document.unpick(*names, clip=clip)
 
@@ -75,7 +75,9 @@ def lock(session: Session) -> None:
     if document is None or not ids:
         session.say(texts.SELECT_A_HANDLE, "warning")
     elif set(ids) <= set(document.grade.locks):
-        session.edit(lambda d: d.unlock(*ids), texts.WAS_UNLOCKED.format(ids=", ".join(ids)))
+        session.edit(
+            lambda d: d.lock(*ids, locked=False), texts.WAS_UNLOCKED.format(ids=", ".join(ids))
+        )
     else:
         new = [id_ for id_ in ids if id_ not in document.grade.locks]
         session.edit(lambda d: d.lock(*new), texts.WAS_LOCKED.format(ids=", ".join(new)))
@@ -207,7 +209,7 @@ def rename_version(session: Session, name: str, new: str) -> None:
     """Give a version another name (`version rename`); what shows it goes on with that name."""
     shown = {part: new for part in ("version", "after") if getattr(session.view, part) == name}
     session.edit(
-        lambda document: document.rename_version(name, new),
+        lambda document: document.change_version(name, rename=new),
         texts.RENAMED_VERSION.format(name=name, new=new),
     )
     if new in session.versions:
@@ -216,7 +218,9 @@ def rename_version(session: Session, name: str, new: str) -> None:
 
 def note_version(session: Session, name: str, note: str) -> None:
     """Say something about a version (`version note`)."""
-    session.edit(lambda document: document.set_note(name, note), texts.NOTED.format(name=name))
+    session.edit(
+        lambda document: document.change_version(name, note=note), texts.NOTED.format(name=name)
+    )
 
 
 def remove_versions(session: Session, names: list[str]) -> None:
