@@ -342,6 +342,7 @@ def rows(hand: Hand) -> Iterator[Row]:
     before: list[list[str]] = []
 
     def move_in_solid() -> None:
+        session.go(FRAME)
         palette = window.solid.palette_now()
         assert palette is not None
         index = palette.ids.index(edge)
