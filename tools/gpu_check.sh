@@ -61,7 +61,7 @@ run() {
         status=0
         for part in gpu_check_errors gpu_check_speed "gpu_ -gpu_check"; do
             # shellcheck disable=SC2086
-            timeout 75 $start "$test_program" "$folder/Palette4D.ofx.bundle" "$folder/work" $part 2>&1 ||
+            timeout 180 $start "$test_program" "$folder/Palette4D.ofx.bundle" "$folder/work" $part 2>&1 ||
                 status=$?
         done
         echo "gpu_check: status $status"
