@@ -200,8 +200,9 @@ def test_a_sudden_cut_has_a_button_that_allows_it(
     allow.click()
     qtbot.waitUntil(lambda: window.session.document is not None, timeout=60_000)
     # What was noted stays in sight when the dialog has closed.
-    assert window.session.status.level == "warning"
-    assert "sudden cut" in window.session.status.text
+    qtbot.waitUntil(lambda: bool(window.banner.entries))
+    (note,) = (each for each in window.banner.entries.values() if "sudden cut" in each.text)
+    assert note.level == "warning"
 
 
 def test_undo_brings_back_the_palette_before_an_analysis(

@@ -427,7 +427,8 @@ def _path(pick: Pick) -> list[str]:
     colours = [
         f"{patch}{text} at frame {at:g}" for at, (text, patch) in zip(told, hexes, strict=True)
     ]
-    lines = [f"  follows its colour: {', '.join(colours)}"]
+    changes = len({text for text, _ in hexes}) > 1
+    lines = [f"  follows its colour{': ' + ', '.join(colours) if changes else ', which stays'}"]
     begin, end = pick.alike()
     limits = [f"--from {begin:g}"] * (begin > first) + [f"--until {end:g}"] * (end < last)
     given = any(key.given and key.frame == far for key in pick.path)

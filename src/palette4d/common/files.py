@@ -56,7 +56,7 @@ def refuse_existing(path: Path, force: bool, made: Path | None = None) -> None:
 
 def make_folder(folder: Path) -> None:
     """Make a folder and its parents."""
-    if locking.delegate is not None:
+    if locking.delegate is not None and not locking.delegate.owns(folder):
         locking.delegate.ask("make_folder", os.fspath(folder.absolute()))
         return
     try:
@@ -122,7 +122,7 @@ def replacing(
     force : replace a file that exists.
     check : called immediately before the rename; if it raises, `path` is unchanged.
     """
-    if locking.delegate is not None:
+    if locking.delegate is not None and not locking.delegate.owns(path):
         with locking.delegate.replacing(path, force=force, check=check) as elsewhere:
             yield elsewhere
         return
@@ -153,10 +153,7 @@ def replacing(
             check()
         _rename(temporary, path)
     except OSError as error:
-        raise WriteError(
-            f"{path}: cannot be written: {error.strerror or error}; expected a disk with room, "
-            "make some or choose another folder"
-        ) from error
+        raise unwritten(path, error) from error
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
@@ -350,6 +347,14 @@ def _sync_folder(folder: Path) -> None:
             os.fsync(handle)
         finally:
             os.close(handle)
+
+
+def unwritten(path: Path, error: OSError) -> WriteError:
+    """Return the error for a file that the disk did not take."""
+    return WriteError(
+        f"{path}: cannot be written: {error.strerror or error}; expected a disk with room, "
+        "make some or choose another folder"
+    )
 
 
 def closed(path: Path, why: str = "") -> WriteError:

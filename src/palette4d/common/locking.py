@@ -40,7 +40,7 @@ def locked(target: Path) -> Iterator[Callable[[], None]]:
     if not target.parent.is_dir():
         yield lambda: None  # the write reports the error
         return
-    if delegate is not None:
+    if delegate is not None and not delegate.owns(target):
         with delegate.locked(target) as held_there:
             yield held_there
         return

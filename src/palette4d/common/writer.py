@@ -83,6 +83,10 @@ class Writer:
         print(json.dumps([what, *arguments]), file=self._requests, flush=True)
         return self._answer()
 
+    def owns(self, path: Path) -> bool:
+        """Whether a path lies in the command's own folder, where it writes by itself."""
+        return self.folder is not None and path.absolute().is_relative_to(self.folder)
+
     def _answer(self) -> Any:
         found, error = pickle.load(self._answers)  # noqa: S301 - of the process that we trust
         if error is not None:
@@ -103,6 +107,8 @@ class Writer:
             if check is not None:
                 check()
             self.ask("place", temporary.name, os.fspath(path.absolute()), force)
+        except OSError as error:
+            raise files.unwritten(path, error) from error
         finally:
             temporary.unlink(missing_ok=True)
 

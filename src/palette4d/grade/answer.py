@@ -84,8 +84,6 @@ class Answer:
         A neighbouring part of the same hue that is not taken; a box there would add it.
     floods : bool
         The pick takes so much that it may be more than one thing.
-    tried : bool
-        Holds and boxes were tried.
     """
 
     frame: int
@@ -95,7 +93,6 @@ class Answer:
     hold: Place | None = None
     part: Place | None = None
     floods: bool = False
-    tried: bool = True
 
     def lines(self, id: str) -> list[str]:
         """Return the answer for people, and the gestures that help as arguments of `edit`."""
@@ -108,11 +105,6 @@ class Answer:
             lines.append(
                 f"also takes {percent(self.others)} elsewhere, most of it {hex_of(self.other.rgb)} "
                 f"at {place(self.other)}"
-            )
-        if self.other is not None and self.hold is None and self.tried:
-            lines.append(
-                "  no hold there keeps it and spares the rest: hold another part of it, or change "
-                f"{id} --reach -1"
             )
         if self.hold is not None:
             lines.append(
@@ -159,7 +151,7 @@ def answer_to(
     beside = float(others.mean())
     large = share > LARGE or _borders(own) >= 3
     floods = view.far(pick, own) > (SOME if large else MOST)
-    answer = Answer(frame, share, beside, floods=floods, tried=tries)
+    answer = Answer(frame, share, beside, floods=floods)
     if beside > OTHERS:
         answer = replace(answer, other=view.place(others))
         if tries:
