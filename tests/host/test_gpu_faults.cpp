@@ -222,7 +222,9 @@ TEST(gpu_memory_stays_flat) {
         draw(frames);
         const long grown = resident() - before;
         CHECK(g_faults.alive() == objects);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // they keep what was freed
         EXPECT(grown < 4 << 20, std::to_string(grown));
+#endif
         for (long i = 0; i < contexts; ++i) {
             const auto fresh = new_context();
             CHECK(node.right(*fresh));
