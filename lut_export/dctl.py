@@ -1,18 +1,13 @@
 """Write a clip's palette, edits, picks and time as one DCTL file for DaVinci Resolve."""
 
 import os
-from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 
-from palette4d.lut_export.clip_conversion import number
-from palette4d.lut_export.clip_text import ClipText, clip_text
+from palette4d.lut_export.clip_file import ClipExport, arrays_text, write_clip
+from palette4d.lut_export.clip_text import ClipText
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
-from palette4d.common.files import refuse_existing, replacing
-from palette4d.common.text import printable
-from palette4d.grade import sidecar as sidecars
 from palette4d.grade.document import Document
 
 _TEXT = """\
@@ -57,29 +52,6 @@ __DEVICE__ float4 transform(int p_Width, int p_Height, int p_X, int p_Y, float p
 }"""
 
 
-@dataclass(frozen=True)
-class ClipExport:
-    """The file that was written.
-
-    Attributes
-    ----------
-    output : str
-        The file.
-    first, last : int
-        The clip's frames that it knows; before and after them the nearest holds.
-    keys : int
-        The times at which the palette is stored.
-    constant_bytes : int
-        The memory for them, of `MOST_BYTES`.
-    """
-
-    output: str
-    first: int
-    last: int
-    keys: int
-    constant_bytes: int
-
-
 def export_dctl(
     source: str | os.PathLike[str] | Document,
     path: str | os.PathLike[str],
@@ -118,57 +90,20 @@ def export_dctl(
     output = Path(path)
     if output.suffix.lower() != ".dctl":
         raise Palette4dError(f"{output}: found no extension .dctl; name the file NAME.dctl")
-    refuse_existing(output, force)
-    sidecar = source_of(source)
-    clip = clip_text(sidecar, frames, output)
-    text = _TEXT.format(
-        name=one_line(sidecar),
-        first=clip.first,
-        last=clip.last,
-        version=_core.__version__,
-        since=" 19.1" if alpha else "",
-        offset=clip.first - 1,
-        alpha="DEFINE_DCTL_ALPHA_MODE_STRAIGHT\n" if alpha else "",
-        defines=clip.defines,
-        arrays=arrays_text(clip, "__CONSTANT__ {kind} {name}[{count}] = {{\n    {values}}};"),
-        kernel=clip.text,
-        transform=_WITH_ALPHA if alpha else _PLAIN,
-    )
-    with replacing(output, force=force) as temporary:
-        temporary.write_text(text, encoding="ascii", errors="replace", newline="\n")
-    return ClipExport(str(output), clip.first, clip.last, clip.keys, clip.size)
 
+    def text_of(clip: ClipText, name: str) -> str:
+        return _TEXT.format(
+            name=name,
+            first=clip.first,
+            last=clip.last,
+            version=_core.__version__,
+            since=" 19.1" if alpha else "",
+            offset=clip.first - 1,
+            alpha="DEFINE_DCTL_ALPHA_MODE_STRAIGHT\n" if alpha else "",
+            defines=clip.defines,
+            arrays=arrays_text(clip, "__CONSTANT__ {kind} {name}[{count}] = {{\n    {values}}};"),
+            kernel=clip.text,
+            transform=_WITH_ALPHA if alpha else _PLAIN,
+        )
 
-def source_of(source: str | os.PathLike[str] | Document) -> _core.Sidecar:
-    """Return the sidecar of a path or a document."""
-    if isinstance(source, Document):
-        return source.grade.core
-    return _core.parse_sidecar(sidecars.read_bytes(source), os.fspath(source))
-
-
-def one_line(sidecar: _core.Sidecar) -> str:
-    """Return the clip's name for a comment."""
-    return " ".join(printable(str(sidecar.clip["name"])).split())
-
-
-def arrays_text(clip: ClipText, form: str) -> str:
-    """Return the declarations of a clip's constants in a form."""
-    texts = []
-    for name, numbers in clip.arrays.items():
-        kind = "int" if all(isinstance(value, int) for value in numbers) else "float"
-        values = list(map(_integer if kind == "int" else number, numbers))
-        texts.append(form.format(kind=kind, name=name, count=len(values), values=_rows(values)))
-    return "\n".join(texts)
-
-
-def _integer(value: float) -> str:
-    """Return an int literal of 32 bits."""
-    bits = int(value) & 0xFFFFFFFF
-    signed = bits - (1 << 32) if bits >> 31 else bits
-    return str(signed) if signed != -(1 << 31) else "(-2147483647 - 1)"
-
-
-def _rows(texts: Iterable[str]) -> str:
-    """Return numbers in rows."""
-    all_of = list(texts)
-    return ",\n    ".join(", ".join(all_of[i : i + 8]) for i in range(0, len(all_of), 8))
+    return write_clip(source, output, text_of, frames=frames, force=force)

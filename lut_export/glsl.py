@@ -3,12 +3,11 @@
 import os
 from pathlib import Path
 
-from palette4d.lut_export.clip_text import clip_text
-from palette4d.lut_export.dctl import ClipExport, arrays_text, one_line, source_of
+from palette4d.lut_export.clip_file import ClipExport, arrays_text, write_clip
+from palette4d.lut_export.clip_text import ClipText
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
-from palette4d.common.files import refuse_existing, replacing
 from palette4d.grade.document import Document
 
 _HEAD = """\
@@ -99,17 +98,11 @@ def export_glsl(
             f"{output}: found no extension .glsl or .hook; name the file NAME.glsl for a fragment "
             "function, NAME.hook for a shader of mpv"
         )
-    refuse_existing(output, force)
-    sidecar = source_of(source)
-    clip = clip_text(sidecar, frames, output)
-    name = one_line(sidecar)
-    body = _BODY.format(
-        defines=clip.defines,
-        arrays=arrays_text(clip, "const {kind} {name}[{count}] = {kind}[{count}](\n    {values});"),
-        kernel=clip.text,
-    )
-    head = _HEAD.format(name=name, first=clip.first, last=clip.last, version=_core.__version__)
-    text = head + form.format(name=name, first=clip.first, body=body)
-    with replacing(output, force=force) as temporary:
-        temporary.write_text(text, encoding="ascii", errors="replace", newline="\n")
-    return ClipExport(str(output), clip.first, clip.last, clip.keys, clip.size)
+
+    def text_of(clip: ClipText, name: str) -> str:
+        array = "const {kind} {name}[{count}] = {kind}[{count}](\n    {values});"
+        body = _BODY.format(defines=clip.defines, arrays=arrays_text(clip, array), kernel=clip.text)
+        head = _HEAD.format(name=name, first=clip.first, last=clip.last, version=_core.__version__)
+        return head + form.format(name=name, first=clip.first, body=body)
+
+    return write_clip(source, output, text_of, frames=frames, force=force)

@@ -9,7 +9,7 @@ from ctypes import c_char_p, c_float, c_int, c_uint, c_void_p
 from typing import Any
 
 import numpy as np
-import pytest
+from gpu_needed import lacks
 from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
@@ -56,9 +56,7 @@ def run(fragment: str, image: F32, uniforms: dict[str, float]) -> F32:
     """
     gl = functions()
     if gl is None:
-        what = "no OpenGL without a window (Debian: libegl1, libegl-mesa0 and libgl1-mesa-dri)"
-        assert os.environ.get("PALETTE4D_REQUIRE_GPU") != "1", what
-        pytest.skip(what)
+        lacks("no OpenGL without a window (Debian: libegl1, libegl-mesa0 and libgl1-mesa-dri)")
     program = gl("glCreateProgram", result=c_uint)
     for kind, text in ((0x8B31, _VERTEX), (0x8B30, fragment.encode())):
         shader = gl("glCreateShader", c_uint(kind), result=c_uint)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import os
 from ctypes import byref, c_char_p, c_int, c_size_t, c_uint, c_ulong, c_void_p
 
 import numpy as np
-import pytest
+from gpu_needed import lacks
 from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
@@ -39,9 +38,7 @@ def run(source: str, name: str, options: str, image: F32) -> F32:
     """Run the kernel `name` (in, out), a work item for each row of `image`; skip without OpenCL."""
     found = system()
     if found is None:
-        what = "no OpenCL on this machine (Debian: pocl-opencl-icd and ocl-icd-libopencl1)"
-        assert os.environ.get("PALETTE4D_REQUIRE_GPU") != "1", what
-        pytest.skip(what)
+        lacks("no OpenCL on this machine (Debian: pocl-opencl-icd and ocl-icd-libopencl1)")
     cl, device, context, queue = found
     error, text = c_int(), c_char_p(source.encode())
     program = c_void_p(cl.clCreateProgramWithSource(context, 1, byref(text), None, byref(error)))

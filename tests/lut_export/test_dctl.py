@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from opencl import run
-from palette4d.lut_export import clip_text, dctl
+from palette4d.lut_export import clip_file, clip_text
 from parity.cases import DOCUMENTS, Document, edited, split_merge_document
 from parity.kernel import compiler
 from whole_clips import CONVERTED, PROMISE, converted, exact
@@ -66,7 +66,7 @@ def colours() -> F32:
     return np.random.default_rng(8).uniform(-0.2, 1.2, (3000, 3)).astype(np.float32)
 
 
-def exported(document: Document, folder: Path, **options: Any) -> tuple[Path, dctl.ClipExport]:
+def exported(document: Document, folder: Path, **options: Any) -> tuple[Path, clip_file.ClipExport]:
     """The DCTL of a document."""
     source, output = folder / "shot.p4d.json", folder / "shot.dctl"
     source.write_text(json.dumps(document), encoding="utf-8")

@@ -27,13 +27,16 @@ _STRIP = 30_000
 
 
 def _newer(cls: type[Type], value: int) -> Type:
-    """Return a member for a type that PyAV does not know, such as Exif; else it raises an error."""
+    """Return a member for a type that PyAV does not know, such as Exif.
+
+    Else PyAV raises an error for all side data of the frame, its display matrix too.
+    """
     found: Any = object.__new__(cls)
     found._value_, found._name_ = value, f"TYPE_{value}"
     return cast(Type, found)
 
 
-Type._missing_ = classmethod(_newer)  # type: ignore[assignment]
+Type._missing_ = classmethod(_newer)  # type: ignore[assignment] # the hook of enum.Enum
 
 
 def turn(picture: av.VideoFrame) -> tuple[bool, bool, bool]:
