@@ -5,14 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from analysis_frames import constant, grey, mixture, noise, stats
-from palette4d.analysis.convex_hulls import hull_mesh
 from palette4d.analysis.frame_hulls import frame_palette, merge_close
 from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
-from scipy.spatial import ConvexHull
-
-from palette4d import _core
 
 GAMUT = Gamut(np.zeros(3), np.ones(3))
 OPTIONS = AnalysisOptions()
@@ -26,31 +22,6 @@ def is_closed_and_outward(palette):
     corners = palette.rgb[palette.faces] - palette.rgb.mean(axis=0)
     volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
     return closed, volume
-
-
-def test_progressive_hull_encloses_the_hull_it_simplifies():
-    rng = np.random.default_rng(1)
-    for _ in range(10):
-        mesh = hull_mesh(rng.normal(0.5, 0.15, (400, 3)))
-        outer = _core.progressive_hull(mesh.rgb, mesh.faces, 8)
-        assert 4 <= len(outer) <= 8
-        equations = ConvexHull(outer).equations
-        inside = mesh.rgb @ equations[:, :3].T + equations[:, 3]
-        assert inside.max() < 1e-7
-        assert ConvexHull(outer).volume >= ConvexHull(mesh.rgb).volume
-
-
-def test_progressive_hull_needs_a_closed_mesh():
-    mesh = hull_mesh(np.random.default_rng(2).random((30, 3)))
-    with pytest.raises(ValueError, match="closed"):
-        _core.progressive_hull(mesh.rgb, mesh.faces[1:], 8)
-
-
-def test_scale_does_not_matter_to_the_progressive_hull():
-    mesh = hull_mesh(np.random.default_rng(3).random((200, 3)))
-    small = _core.progressive_hull(mesh.rgb, mesh.faces, 8)
-    large = _core.progressive_hull(mesh.rgb * 1000 - 300, mesh.faces, 8)
-    np.testing.assert_allclose(large, small * 1000 - 300, atol=1e-5)
 
 
 @pytest.mark.parametrize("seed", range(4))

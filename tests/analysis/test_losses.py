@@ -12,8 +12,6 @@ from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.losses import NO_FACES, minimise, refine_palette, smoothness
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette
-from scipy.optimize import minimize
-from scipy.spatial import ConvexHull
 
 from palette4d import _core
 
@@ -31,110 +29,6 @@ def loss(points, palette, counts=None, k=1.0):
         tree(points, counts), np.asarray(palette, float), NO_FACES, _core.LossWeights(50.0, k)
     )
     return {"R": r, "C": c, "shape": shape, "outside": outside, "far": far}
-
-
-@pytest.mark.parametrize(
-    ("point", "distance"),
-    [
-        ([0.5, 0.5, 0.5], 0.0),
-        ([0.75, 0.5, 0.5], 0.0),
-        ([0.85, 0.5, 0.5], 0.1),
-        ([0.85, 0.85, 0.5], 0.1 * 2**0.5),
-        ([0.85, 0.85, 0.85], 0.1 * 3**0.5),
-        ([0.0, 0.0, 0.0], 0.25 * 3**0.5),
-    ],
-)
-def test_distance_to_a_cube(point, distance):
-    assert loss(point, BOX)["R"] == pytest.approx(distance, abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("palette", "point", "distance"),
-    [
-        ([[0.2, 0.2, 0.2]], [0.2, 0.6, 0.5], 0.5),
-        ([[0, 0, 0], [1, 1, 1]], [1, 0, 0], (2 / 3) ** 0.5),
-        ([[0, 0, 0], [1, 1, 1]], [2, 2, 2], 3**0.5),
-        ([[0, 0, 0.5], [1, 0, 0.5], [0, 1, 0.5], [1, 1, 0.5]], [0.5, 0.5, 0.8], 0.3),
-        ([[0, 0, 0.5], [1, 0, 0.5], [0, 1, 0.5], [1, 1, 0.5]], [1.3, 0.5, 0.9], 0.5),
-    ],
-)
-def test_distance_to_flat_palettes(palette, point, distance):
-    assert loss(point, palette)["R"] == pytest.approx(distance, abs=1e-12)
-
-
-def closest_by_optimisation(point, palette):
-    """Distance to the convex hull as a quadratic program over convex weights."""
-    n = len(palette)
-    result = minimize(
-        lambda w: ((w @ palette - point) ** 2).sum(),
-        np.full(n, 1 / n),
-        jac=lambda w: 2 * palette @ (w @ palette - point),
-        bounds=[(0, 1)] * n,
-        constraints={"type": "eq", "fun": lambda w: w.sum() - 1},
-        method="SLSQP",
-        options={"ftol": 1e-14, "maxiter": 500},
-    )
-    return result.fun**0.5
-
-
-def test_distance_matches_a_quadratic_program():
-    rng = np.random.default_rng(3)
-    for _ in range(20):
-        palette = rng.random((rng.integers(4, 9), 3))
-        point = rng.random(3) * 2 - 0.5
-        expected = closest_by_optimisation(point, palette)
-        assert loss(point, palette)["R"] == pytest.approx(expected, abs=2e-5)
-
-
-def test_inside_agrees_with_qhull():
-    rng = np.random.default_rng(4)
-    points = rng.random((3000, 3))
-    palette = rng.random((8, 3))
-    hull = ConvexHull(palette)
-    outside = (points @ hull.equations[:, :3].T + hull.equations[:, 3] > 1e-6).any(axis=1)
-    assert loss(points, palette)["outside"] == pytest.approx(outside.mean())
-
-
-def test_counts_weigh_like_repeated_pixels():
-    rng = np.random.default_rng(5)
-    points, counts = rng.random((200, 3)), rng.integers(1, 6, 200)
-    once = loss(points, BOX, counts.astype(float), k=50)
-    many = loss(np.repeat(points, counts, axis=0), BOX, k=50)
-    assert once["R"] == pytest.approx(many["R"], rel=1e-12)
-    assert once["C"] == pytest.approx(many["C"], rel=1e-9)
-
-
-def test_compactness_shares_ties_and_takes_parts_of_counts():
-    points = [[0.1, 0, 0], [0.2, 0, 0], [0.9, 0.9, 0.9]]
-    found = loss(points, [[0, 0, 0]], np.array([30.0, 40, 500]), k=50)["C"]
-    assert found == pytest.approx((30 * 0.1 + 20 * 0.2) / 50)
-    tied = loss([[0.6, 0.5, 0.5], [0.4, 0.5, 0.5]], [[0.5] * 3], np.array([50.0, 50]), k=50)
-    assert tied["C"] == pytest.approx(0, abs=1e-15)
-
-
-def test_nearest_mean_matches_a_sorted_list():
-    rng = np.random.default_rng(6)
-    points = rng.random((2000, 3))
-    for v in rng.random((20, 3)) * 2 - 0.5:
-        order = np.argsort(((points - v) ** 2).sum(axis=1))
-        expected = points[order[:50]].mean(axis=0)
-        np.testing.assert_allclose(
-            tree(points).nearest_mean(v[None], 50.0)[0], expected, atol=1e-12
-        )
-    few = tree(points[:7]).nearest_mean(np.zeros((1, 3)), 50.0)[0]
-    np.testing.assert_allclose(few, points[:7].mean(axis=0))
-
-
-def test_reach_adds_what_lies_far_outside():
-    rng = np.random.default_rng(11)
-    points, counts = rng.random((300, 3)), rng.integers(1, 6, 300).astype(float)
-    distances = np.array([loss(p, BOX)["R"] for p in points])
-    _, _, shape, *_ = _core.palette_loss(
-        tree(points, counts), BOX, NO_FACES, _core.LossWeights(50.0, 50.0, reach=0.2)
-    )
-    cubed = (distances / 0.2) ** 3
-    far = counts @ (distances * cubed / (1 + cubed / 8))
-    assert shape == pytest.approx(50 * far / counts.sum(), rel=1e-9)
 
 
 def test_gradient_matches_differences():

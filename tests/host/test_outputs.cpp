@@ -1,57 +1,121 @@
-// What the node puts out besides the recoloured picture and mattes: the palette at its foot, kept
-// lightness, a mix with the source; and what holds of all outputs.
+// What the node puts out besides the recoloured picture: mattes, the palette at the picture's foot,
+// kept lightness, a mix with the source. tests/core/output/test_drawing.cpp has what they are;
+// these tests have depths, layouts, tiles and parameters.
 #include <cmath>
-#include <cstring>
 #include <limits>
 
+#include "convert/colour_spaces.hpp"
 #include "harness.hpp"
+#include "model/lineage.hpp"
 
 using namespace strict;
 using namespace test;
-using palette4d::Vec3;
+using palette4d::DrawingOptions;
+using palette4d::Output;
 
-TEST(the_palette_stands_at_the_pictures_foot) {
-    Ready node;
-    Layout layout;
-    layout.bounds = rect(-4, 10, 60, 58);  // 64 by 48: eight colours of 8 by 6
-    for (const bool tiles : {false, true}) {
-        Picture source(layout), recoloured(layout), output(layout);
-        fill(source);
-        node.set("output", 0);
-        CHECK(node.instance->render(5, &source, recoloured, layout.bounds) == kOfxStatOK);
-        node.set("output", 2);
-        const int step = tiles ? 7 : 1000;
-        for (int y = 10; y < 58; y += step) {
-            for (int x = -4; x < 60; x += step) {
-                CHECK(node.instance->render(5, &source, output,
-                                            rect(x, y, std::min(x + step, 60),
-                                                 std::min(y + step, 58))) == kOfxStatOK);
-            }
-        }
-        const OfxRectI above = rect(-4, 16, 60, 58);
-        CHECK(output.pixels(above) == recoloured.pixels(above));
-        const palette4d::Slice slice = palette4d::slice_at(node.parsed.polytope, 15);
-        const std::vector<Vec3> edited =
-            palette4d::edited_colours(node.parsed.polytope, node.parsed.edits, slice);
-        CHECK(edited != slice.rgb);
-        for (int y = 10; y < 16; ++y) {
-            for (int x = -4; x < 60; ++x) {
-                const auto i = static_cast<std::size_t>((x + 4) / 8);
-                const Vec3& colour = (y < 13 ? edited : slice.rgb)[i];
-                const float* found = output.floats(x, y);
-                for (std::size_t c = 0; c < 3; ++c) {
-                    CHECK(found[c] == static_cast<float>(colour[c]));
-                }
-                CHECK(found[3] == 1);
-            }
-        }
-        // A host that wants colours alone, for a LUT, gets no strip.
-        node.instance->extra_arguments["OfxImageEffectPropNoSpatialAwareness"] =
-            std::string("true");
-        CHECK(node.instance->render(5, &source, output, layout.bounds) == kOfxStatOK);
-        CHECK(output.pixels(layout.bounds) == recoloured.pixels(layout.bounds));
-        node.instance->extra_arguments.clear();
+namespace {
+
+/// What the core draws of the sidecar at a frame; a matte of the weight is of handle 8, v7.
+palette4d::Drawing drawing_of(const palette4d::Sidecar& sidecar, double frame,
+                              const DrawingOptions& options) {
+    const palette4d::Slice slice = palette4d::slice_at(sidecar.polytope, frame);
+    palette4d::Drawing drawing;
+    drawing.options = options;
+    drawing.original = slice.rgb;
+    drawing.edited = palette4d::edited_colours(sidecar.polytope, sidecar.edits, slice);
+    if (!options.is_matte()) {
+        drawing.edit =
+            std::make_shared<const palette4d::Recolourer>(slice.rgb, drawing.edited, slice.faces);
+        return drawing;
     }
+    const auto reader = options.output == Output::kOutside
+                            ? palette4d::surface_reader(slice)
+                            : palette4d::weight_reader(
+                                  slice, palette4d::Lineage(sidecar.polytope, sidecar.edits, 7));
+    drawing.reader = std::make_shared<const palette4d::Recolourer>(slice.rgb, reader, slice.faces);
+    return drawing;
+}
+
+}  // namespace
+
+TEST(every_output_is_the_cores_in_every_layout) {
+    struct Case {
+        DrawingOptions options;
+        std::vector<std::pair<const char*, Value>> parameters;
+    };
+    std::vector<Case> cases;
+    const auto add = [&](std::vector<std::pair<const char*, Value>> parameters) {
+        cases.push_back({{}, std::move(parameters)});
+        return &cases.back().options;
+    };
+    const char* const spaces[] = {"Rec.709", "Rec.2020", "P3-D65", "ACEScg", "Rec.601"};
+    for (int space = 0; space < 5; ++space) {
+        DrawingOptions* kept = add({{"keepLightness", 0.7}, {"lightnessOf", 1 + space}});
+        kept->keep = 0.7;
+        kept->lightness = palette4d::luminance_weights(spaces[space]);
+    }
+    for (const int alpha : {0, 1}) {
+        for (const double mix : {1.0, 0.5}) {
+            for (const auto output : {Output::kWeight, Output::kPalette, Output::kOutside}) {
+                DrawingOptions* options = add({{"output", static_cast<int>(output)},
+                                               {"weightOf", 8},
+                                               {"outsideReach", 0.4},
+                                               {"matteIn", alpha},
+                                               {"mix", mix}});
+                options->output = output;
+                options->in_alpha = alpha;
+                options->reach = 0.4;
+                options->mix = mix;
+            }
+        }
+    }
+    add({{"mix", 0.5}})->mix = 0.5;
+    Ready node;
+    for (const Layout& layout : layouts()) {
+        const OfxRectI& b = layout.bounds;
+        const Picture source = source_of(layout);
+        for (const Case& one : cases) {
+            node.instance = node.plugin.create();
+            node.set("sidecar", node.path);
+            for (const auto& [name, value] : one.parameters) node.set(name, value);
+            Picture seen = source, tiled(layout);
+            // Of an opaque picture alpha is 1, whatever stands in it.
+            const bool opaque = layout.channels == 4 &&
+                                layout.premultiplication == std::string(kOfxImageOpaque) &&
+                                one.options.is_matte() && one.options.in_alpha;
+            for (int y = b.y1; opaque && y < b.y2; ++y) {
+                for (int x = b.x1; x < b.x2; ++x) {
+                    const auto full = stored(layout, {1.0f});
+                    std::copy(full.begin(), full.end(), seen.at(x, y) + 3 * layout.number_bytes());
+                }
+            }
+            for (int y = b.y1; y < b.y2; y += 11) {
+                for (int x = b.x1; x < b.x2; x += 23) {
+                    const OfxRectI tile =
+                        rect(x, y, std::min(x + 23, b.x2), std::min(y + 11, b.y2));
+                    CHECK(node.instance->render(4, &source, tiled, tile) == kOfxStatOK);
+                }
+            }
+            const auto found = tiled.pixels(b);
+            EXPECT(found == drawn(drawing_of(node.parsed, 14, one.options), seen, b),
+                   "case " + std::to_string(&one - cases.data()) + " in a layout of depth " +
+                       std::to_string(static_cast<int>(layout.depth)) + ", " +
+                       std::to_string(layout.channels) + " channels, " + layout.premultiplication);
+            CHECK(found != source.pixels(b));
+        }
+    }
+}
+
+TEST(a_lut_gets_no_palette_at_its_foot) {
+    Ready node;
+    const Layout layout;
+    Picture source(layout), output(layout);
+    fill(source);
+    node.set("output", 2);
+    // A host that wants colours alone.
+    node.instance->extra_arguments["OfxImageEffectPropNoSpatialAwareness"] = std::string("true");
+    CHECK(node.instance->render(5, &source, output, layout.bounds) == kOfxStatOK);
+    CHECK(output.pixels(layout.bounds) == recoloured(node.parsed, 15, source, layout.bounds));
 }
 
 TEST(the_palette_of_an_unedited_sidecar_is_shown_too) {
@@ -72,57 +136,6 @@ TEST(the_palette_of_an_unedited_sidecar_is_shown_too) {
     node.instance->extra_arguments["OfxImageEffectPropNoSpatialAwareness"] = std::string("true");
     CHECK(node.instance->render(3, &source, output, layout.bounds) == kOfxStatOK);
     CHECK(output.pixels(layout.bounds) == source.pixels(layout.bounds));
-}
-
-TEST(lightness_is_kept) {
-    Ready node;
-    const double weights[][3] = {{0.2126390059, 0.7151686788, 0.0721923154},
-                                 {0.2627002120, 0.6779980715, 0.0593017165},
-                                 {0.2289745641, 0.6917385218, 0.0792869141},
-                                 {0.2722287168, 0.6740817658, 0.0536895174},
-                                 {0.299, 0.587, 0.114}};
-    for (int space = 0; space < 5; ++space) {
-        const auto& w = weights[space];
-        CHECK(std::abs(w[0] + w[1] + w[2] - 1) < 1e-9);
-        for (const char* alpha : {kOfxImageUnPreMultiplied, kOfxImagePreMultiplied}) {
-            for (const double keep : {1.0, 0.25}) {
-                Layout layout;
-                layout.premultiplication = alpha;
-                const Picture source = source_of(layout);
-                Picture plain(layout), kept(layout);
-                node.set("keepLightness", 0.0);
-                CHECK(node.instance->render(4, &source, plain, layout.bounds) == kOfxStatOK);
-                node.set("lightnessOf", 1 + space);
-                node.set("keepLightness", keep);
-                CHECK(node.instance->render(4, &source, kept, layout.bounds) == kOfxStatOK);
-                const auto in = floats(layout, source.pixels(layout.bounds));
-                const auto moved = floats(layout, plain.pixels(layout.bounds));
-                const auto out = floats(layout, kept.pixels(layout.bounds));
-                int changed = 0;
-                for (std::size_t i = 0; i < in.size(); i += 4) {
-                    CHECK(std::memcmp(&out[i + 3], &in[i + 3], 4) == 0);
-                    if (std::memcmp(&in[i], &moved[i], 12) == 0) {
-                        CHECK(std::memcmp(&in[i], &out[i], 12) == 0);
-                        continue;
-                    }
-                    double y_in = 0, y_moved = 0, y_out = 0, size = 1;
-                    for (std::size_t c = 0; c < 3; ++c) {
-                        y_in += w[c] * in[i + c];
-                        y_moved += w[c] * moved[i + c];
-                        y_out += w[c] * out[i + c];
-                        size = std::max(size, static_cast<double>(std::abs(in[i + c])));
-                    }
-                    const double expected = y_moved + keep * (y_in - y_moved);
-                    CHECK(std::abs(y_out - expected) <= 1e-6 * size);
-                    changed += std::abs(y_in - y_moved) > 1e-3;
-                    // Differences between the channels are the edit's.
-                    CHECK(std::abs((out[i] - out[i + 1]) - (moved[i] - moved[i + 1])) <=
-                          1e-6 * size);
-                }
-                CHECK(changed > 20);
-            }
-        }
-    }
 }
 
 TEST(lightness_is_that_of_the_pictures_own_space) {
@@ -154,42 +167,6 @@ TEST(lightness_is_that_of_the_pictures_own_space) {
     }
 }
 
-TEST(mix_goes_from_the_source_to_what_is_put_out) {
-    Ready node;
-    for (const int output : {0, 1, 3}) {
-        node.set("output", output);
-        for (const Layout& layout : layouts()) {
-            const Picture source = source_of(layout);
-            Picture whole(layout), half(layout), none(layout);
-            node.set("mix", 1.0);
-            CHECK(node.instance->render(4, &source, whole, layout.bounds) == kOfxStatOK);
-            node.set("mix", 0.5);
-            CHECK(node.instance->render(4, &source, half, layout.bounds) == kOfxStatOK);
-            node.set("mix", 0.0);
-            CHECK(node.instance->render(4, &source, none, layout.bounds) == kOfxStatOK);
-            CHECK(none.pixels(layout.bounds) == source.pixels(layout.bounds));
-            std::string clip;
-            double time = 0;
-            CHECK(node.instance->is_identity(4, clip, time) == kOfxStatOK);
-            const auto in = floats(layout, source.pixels(layout.bounds));
-            const auto all = floats(layout, whole.pixels(layout.bounds));
-            const auto mixed = floats(layout, half.pixels(layout.bounds));
-            const double step = 2 * rounding(layout.depth) + 1e-6;
-            for (std::size_t i = 0; i < in.size(); ++i) {
-                if (!std::isfinite(in[i]) || !std::isfinite(all[i])) continue;
-                // Integers do not tell what lies beyond them.
-                const bool integers = layout.depth == Depth::kByte || layout.depth == Depth::kShort;
-                if (integers && (all[i] == 0 || all[i] == 1)) continue;
-                const double expected = (static_cast<double>(in[i]) + all[i]) / 2;
-                EXPECT(std::abs(mixed[i] - expected) <= step * std::max(1.0, std::abs(expected)),
-                       "found " + std::to_string(mixed[i]) + ", expected " +
-                           std::to_string(expected) + " between " + std::to_string(in[i]) +
-                           " and " + std::to_string(all[i]));
-            }
-        }
-    }
-}
-
 TEST(an_alpha_clip_passes) {
     Ready node;
     for (const int output : {0, 1, 2, 3}) {
@@ -203,28 +180,6 @@ TEST(an_alpha_clip_passes) {
             CHECK(node.instance->render(4, &source, result, layout.bounds) == kOfxStatOK);
             CHECK(result.pixels(layout.bounds) == source.pixels(layout.bounds));
         }
-    }
-}
-
-TEST(outputs_keep_their_bits_in_tiles_threads_and_repetition) {
-    Ready node;
-    Layout layout;
-    layout.bounds = rect(0, 0, 70, 90);
-    Picture source(layout);
-    fill(source);
-    node.set("keepLightness", 0.7);
-    node.set("mix", 0.8);
-    for (const int output : {0, 1, 2, 3}) {
-        node.set("output", output);
-        Picture whole(layout), tiled(layout);
-        CHECK(node.instance->render(4.5, &source, whole, layout.bounds) == kOfxStatOK);
-        for (int y = 0; y < 90; y += 11) {
-            for (int x = 0; x < 70; x += 23) {
-                const OfxRectI tile = rect(x, y, std::min(x + 23, 70), std::min(y + 11, 90));
-                CHECK(node.instance->render(4.5, &source, tiled, tile) == kOfxStatOK);
-            }
-        }
-        CHECK(whole.pixels(layout.bounds) == tiled.pixels(layout.bounds));
     }
 }
 

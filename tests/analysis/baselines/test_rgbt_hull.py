@@ -228,19 +228,6 @@ def test_flat_colours_are_enclosed_within_their_plane():
         assert farthest_outside(inside, hull) < 1e-6
 
 
-def test_fewer_vertices_enclose_more():
-    frames = frames_of([cloud(i) for i in range(7)])
-    gamut = Gamut.of(frames)
-    corners = rgbt_hull.all_extremes(frames, gamut)
-    volumes = [
-        ConvexHull(rgbt_hull.simplified(corners, 1001, 1007, gamut, n)).volume
-        for n in (1000, 40, 20, 12, 9)
-    ]
-    assert volumes == sorted(volumes)
-    assert volumes[0] == pytest.approx(ConvexHull(corners).volume)
-    assert volumes[-1] > 1.2 * volumes[0]
-
-
 @pytest.mark.parametrize(
     ("image", "colours"),
     [(noise(1), None), (grey(1), 2), (constant([0.2, 0.3, 0.4]), 1), (lattice(0, 2), 8)],
@@ -323,26 +310,6 @@ def test_the_same_clip_gives_the_same_polytope():
     images = [noise(i, 0.5 + 0.05 * i) for i in range(6)]
     one, other = (sidecar.dumps(document(analysed(images)[1])) for _ in range(2))
     assert one == other
-
-
-def test_slices_recolour_and_weigh():
-    """The node's way: eq. 7 gives every colour back, and an edit moves what is near it."""
-    frames, polytope = analysed([mixture(CORNERS, i) * np.float32(0.9) for i in range(6)], 16)
-    core = sidecar.validate(document(polytope)).polytope
-    for frame in frames:
-        piece = _core.slice_at(core, frame.frame)
-        inside = frame.colours.rgb[:50] * 0.5 + piece.rgb.mean(axis=0) * 0.5
-        weights = _core.polytope_weights(inside, core, frame.frame)
-        np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-9)
-        back = weights @ core.vertices
-        np.testing.assert_allclose(back[:, :3], inside, atol=1e-7)
-        np.testing.assert_allclose(back[:, 3], frame.frame, atol=1e-7)
-        edited = piece.rgb.copy()
-        edited[0] += 0.25
-        image = np.array([[piece.rgb[0], piece.rgb.mean(axis=0)]], np.float32)
-        out = _core.Recolourer(piece.rgb, edited, piece.faces).apply(image)
-        np.testing.assert_allclose(out[0, 0], edited[0], atol=1e-4)
-        assert 0 < (out[0, 1] - image[0, 1]).mean() < 0.2
 
 
 def test_progress_ends_at_its_total():

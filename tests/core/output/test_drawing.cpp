@@ -1,5 +1,5 @@
 // One frame's picture and mattes, where the geometry gives the answer. The node's tests
-// (tests/host/test_mattes.cpp, test_outputs.cpp) try depths, layouts and parameters.
+// (tests/host/test_outputs.cpp) try depths, layouts and parameters.
 #include "output/drawing.hpp"
 
 #include <algorithm>
@@ -81,6 +81,7 @@ TEST(outside_grows_with_the_distance) {
     for (std::size_t i = 0; i < 6; ++i) {
         for (std::size_t c = 0; c < 3; ++c) CHECK_NEAR(out.data[3 * i + c], expected[i], 0.003);
     }
+    CHECK_EQUAL(out.data[0], 0.0f);
 }
 
 TEST(a_matte_stands_in_the_colours_or_in_alpha) {
