@@ -40,35 +40,6 @@ def test_the_weights_of_a_frames_colours_sum_to_one(document, image):
         np.testing.assert_allclose(matte, weights[..., index], atol=3e-4)
 
 
-def test_a_weight_follows_its_colour_along_the_edge(document, image):
-    edge = next(iter(document.grade.core.polytope.edge_ids))
-    first, last = (document.fields()["polytope"]["edges"][0][end] for end in ("from", "to"))
-    frames = {v["id"]: v["frame"] for v in document.fields()["polytope"]["vertices"]}
-    frame = (frames[first] + frames[last]) / 2
-    index = document.grade.palette(frame).ids.index(edge)
-    matte = document.matte(image, frame, f"weight:{first}")
-    assert np.array_equal(matte, document.matte(image, frame, f"weight:{last}"))
-    assert (matte >= document.weights(image, frame)[..., index] - 3e-4).all()
-
-
-def test_outside_is_0_inside_and_1_far_away(document):
-    palette = document.grade.palette(document.grade.frames[0])
-    inside, far = palette.rgb.mean(axis=0), np.array([0, 0, 9])
-    points = np.array([[inside, inside + far, inside - far]], np.float32)
-    assert document.matte(points, document.grade.frames[0], "outside").tolist() == [[0, 1, 1]]
-    near = document.matte(points, document.grade.frames[0], "outside", outside_at=100)
-    assert (near[0, 1:] > 0).all()
-    assert (near[0, 1:] < 0.2).all()
-
-
-def test_kept_lightness_is_the_images(document, image):
-    weights = np.array([0.299, 0.587, 0.114])
-    edit = document.recolour(image, 6)
-    kept = document.recolour(image, 6, keep_lightness=1, lightness_of="rec601")
-    np.testing.assert_allclose(kept @ weights, image @ weights, atol=1e-5)
-    assert np.abs(edit @ weights - image @ weights).max() > 0.01
-
-
 @pytest.mark.parametrize(
     ("given", "said"),
     [

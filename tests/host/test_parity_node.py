@@ -18,7 +18,6 @@ from parity.cases import (
     DOCUMENTS,
     EDITED,
     FAST_TOLERANCE,
-    UNEDITED,
     frames_of,
     picture,
     same_bits,
@@ -107,35 +106,6 @@ def test_the_node_converts_as_render_does(node: Node, channels: int, premultipli
         assert same_bits(found, expected).all()
         assert np.isfinite(found).all()
     assert not same_bits(node.recolour(image, json.loads(text), 6.0), image).all()
-
-
-@pytest.mark.parametrize(("channels", "premultiplied"), SHAPES)
-@pytest.mark.parametrize("name", UNEDITED)
-def test_without_an_edit_the_node_leaves_the_picture_alone(
-    node: Node, name: str, channels: int, premultiplied: bool
-) -> None:
-    image = picture(channels)
-    for time in times_of(name):
-        found = node.recolour(image, DOCUMENTS[name], time, 1.0, premultiplied)
-        assert same_bits(found, image).all()
-
-
-@pytest.mark.parametrize("name", EDITED)
-def test_strength_0_is_the_input(node: Node, name: str) -> None:
-    image = picture(4)
-    for premultiplied in (False, True):
-        found = node.recolour(image, DOCUMENTS[name], times_of(name)[3], 0.0, premultiplied)
-        assert same_bits(found, image).all()
-
-
-def test_awkward_pixels_pass_the_node_bit_for_bit(node: Node) -> None:
-    image = picture(4)
-    odd = ~np.isfinite(image[:, :, :3]).all(axis=2) | (image[:, :, 3] == 0)
-    assert odd.sum() >= 5
-    result = node.recolour(image, DOCUMENTS["changes-vertex"], 9.0, 1.0, True)
-    assert same_bits(result[odd], image[odd]).all()
-    assert same_bits(result[:, :, 3], image[:, :, 3]).all()
-    assert not same_bits(result[~odd][:, :3], image[~odd][:, :3]).all()
 
 
 #: `Document.recolour`'s arguments, and the node's parameters for the same.

@@ -1,4 +1,4 @@
-"""The cases that every implementation runs: reference, compiled core, and the node.
+"""The cases that all implementations run: reference, compiled core, kernel and node.
 
 `DOCUMENTS` are sidecars (JSON documents) by name, `FRAMES` the times to slice them at, `BODIES`
 palettes with points to weigh, and `picture()` an image with everything awkward in it.

@@ -1,9 +1,9 @@
-"""The implementations under test, behind one interface."""
+"""The reference and the core: a document's slices, weights and pictures from each."""
 
 from __future__ import annotations
 
 import json
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,45 +14,6 @@ from palette4d import _core
 F64 = NDArray[np.float64]
 Document = dict[str, Any]
 Position = tuple[str, str, float]
-
-
-class Implementation(Protocol):
-    """What a case asks of an implementation."""
-
-    name: str
-
-    def slice(
-        self, document: Document, frame: float
-    ) -> tuple[F64, list[list[int]], list[Position]]:
-        """Palette colours, faces, and where each colour lies in the polytope."""
-        ...
-
-    def edited(self, document: Document, frame: float) -> F64:
-        """Edited palette colours."""
-        ...
-
-    def mvc(self, points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> F64:
-        """Mean value coordinates."""
-        ...
-
-    def weights(self, points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> tuple[F64, F64]:
-        """Palette weights and distances."""
-        ...
-
-    def polytope_weights(self, points: ArrayLike, document: Document, frame: float) -> F64:
-        """Weights of the polytope's vertices."""
-        ...
-
-    def recolour(
-        self,
-        image: NDArray[np.float32],
-        document: Document,
-        frame: float,
-        strength: float = 1.0,
-        premultiplied: bool = False,
-    ) -> NDArray[np.float32]:
-        """The whole road from a sidecar to a picture."""
-        ...
 
 
 class Reference:
@@ -77,9 +38,6 @@ class Reference:
 
     def weights(self, points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> tuple[F64, F64]:
         return reference.palette_weights(points, rgb, faces)
-
-    def polytope_weights(self, points: ArrayLike, document: Document, frame: float) -> F64:
-        return reference.polytope_weights(points, document, frame)
 
     def recolour(
         self,
@@ -158,9 +116,8 @@ class Core:
         )
 
 
-REFERENCE: Implementation = Reference()
+REFERENCE = Reference()
 #: Double precision throughout: the bakes.
-CORE: Implementation = Core("double")
+CORE = Core("double")
 #: Many colours at a time: the node and `palette4d render`.
-FAST: Implementation = Core("single")
-IMPLEMENTATIONS: list[Implementation] = [REFERENCE, CORE, FAST]
+FAST = Core("single")

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from parity.implementations import Core, Document, Implementation
+from parity.implementations import Core, Document
 
 from palette4d import _core
 
@@ -79,4 +79,4 @@ class Kernel(Core):
         return draw(image, recolourer, strength=strength, premultiplied=premultiplied)
 
 
-KERNEL: Implementation = Kernel()
+KERNEL = Kernel()

@@ -568,18 +568,6 @@ def weights_of(
     return weights, distance
 
 
-def polytope_weights(points: ArrayLike, document: Document, frame: float) -> F64:
-    """Eq. 7: (m, 3) -> (m, N), the product of W_p and the matrix W_t of eq. 6."""
-    names = [vertex["id"] for vertex in document["polytope"]["vertices"]]
-    where = positions(document, frame)
-    matrix = np.zeros((len(where), len(names)))
-    for row, (earlier, later, weight) in enumerate(where):
-        matrix[row, names.index(earlier)] += 1 - weight
-        matrix[row, names.index(later)] += weight
-    inner, _ = palette_weights(points, slice_rgb(document, frame), slice_faces(document, frame))
-    return inner @ matrix
-
-
 # Recolouring -------------------------------------------------------------------------------------
 
 

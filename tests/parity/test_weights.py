@@ -1,13 +1,15 @@
-"""Mean value coordinates and palette weights: every implementation, every kind of palette."""
+"""Mean value coordinates and palette weights: the core and the reference, every kind of palette.
+
+What holds of any weights is in tests/core/recolour/test_mvc.cpp.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from parity.cases import BODIES, DOCUMENTS, Body
-from parity.implementations import CORE, IMPLEMENTATIONS, REFERENCE, Implementation
+from parity.implementations import CORE, REFERENCE
 
-IMPLEMENTED = pytest.mark.parametrize("code", IMPLEMENTATIONS, ids=lambda code: code.name)
 EACH_BODY = pytest.mark.parametrize("body", BODIES, ids=lambda body: body.name)
 SOLID = [body for body in BODIES if len(body.faces) >= 4 and body.name != "square"]
 
@@ -44,42 +46,14 @@ def test_the_textbook_formula_away_from_the_surface() -> None:
         np.testing.assert_allclose(found / size, expected / size, rtol=0, atol=body.tolerance)
 
 
-@IMPLEMENTED
-@EACH_BODY
-def test_weights_sum_to_one_and_reproduce_the_closest_point(
-    code: Implementation, body: Body
-) -> None:
-    weights, distance = code.weights(body.points, body.rgb, body.faces)
-    np.testing.assert_allclose(weights.sum(axis=1), 1, rtol=0, atol=1e-12)
-    closest = weights @ body.rgb
-    # The textbook formula loses digits close to the planes of faces.
-    tolerance = 1e-11 if code is CORE else body.tolerance
-    np.testing.assert_allclose(
-        np.linalg.norm(closest - body.points, axis=1), distance, rtol=0, atol=tolerance
-    )
-
-
-@IMPLEMENTED
-def test_weights_are_linear_in_what_they_weigh(code: Implementation) -> None:
-    """A tetrahedron's mean value coordinates are its barycentric ones."""
-    body = next(body for body in BODIES if body.name == "tetrahedron")
-    weights, distance = code.weights(body.points, body.rgb, body.faces)
-    inside = distance == 0
-    system = np.vstack([body.rgb.T, np.ones(4)])
-    targets = np.column_stack([body.points[inside], np.ones(inside.sum())])
-    expected = np.linalg.solve(system, targets.T).T
-    np.testing.assert_allclose(weights[inside], expected, rtol=0, atol=1e-9)
-
-
-@IMPLEMENTED
 @pytest.mark.parametrize("frame", [0, 3.3, 8, 8.01, 9.5, 10, 14.5, 20, 21.7, 23, 29, 99])
-def test_polytope_weights_are_the_product_of_equation_7(code: Implementation, frame: float) -> None:
+def test_polytope_weights_are_the_product_of_equation_7(frame: float) -> None:
     document = DOCUMENTS["changes"]
     points = np.random.default_rng(5).uniform(-0.2, 1.2, (25, 3))
-    found = code.polytope_weights(points, document, frame)
+    found = CORE.polytope_weights(points, document, frame)
     assert found.shape == (25, len(document["polytope"]["vertices"]))
-    rgb, faces, where = code.slice(document, frame)
-    inner, _ = code.weights(points, rgb, faces)
+    rgb, faces, where = CORE.slice(document, frame)
+    inner, _ = CORE.weights(points, rgb, faces)
     names = [vertex["id"] for vertex in document["polytope"]["vertices"]]
     expected = np.zeros_like(found)
     for column, (first, last, weight) in enumerate(where):
@@ -90,14 +64,3 @@ def test_polytope_weights_are_the_product_of_equation_7(code: Implementation, fr
     table = np.array([[*v["rgb"], v["frame"]] for v in document["polytope"]["vertices"]], float)
     np.testing.assert_allclose(found @ table[:, :3], inner @ rgb, rtol=0, atol=1e-12)
     np.testing.assert_allclose(found @ table[:, 3], min(frame, 30), rtol=0, atol=1e-11)
-
-
-def test_polytope_weights_agree() -> None:
-    points = np.random.default_rng(6).uniform(-0.2, 1.2, (25, 3))
-    for frame in (0, 5.25, 9, 12, 21.5, 30):
-        np.testing.assert_allclose(
-            CORE.polytope_weights(points, DOCUMENTS["changes"], frame),
-            REFERENCE.polytope_weights(points, DOCUMENTS["changes"], frame),
-            rtol=0,
-            atol=1e-8,
-        )
