@@ -4,7 +4,7 @@ Runs `palette4d analyze` in fresh processes on a clip and, in turn, a process th
 same frames (the peer). Prints medians of their user CPU seconds, wall seconds and peak memory, the
 ratio, the time by stage, and the quality of the palette, measured on every pixel.
 
-    python benchmarks/bench_analysis.py CLIP [--runs 5] [--frames A-B] [--evaluator PROGRAM]
+    python benchmarks/bench_analysis.py CLIP [--runs 5] [--frames A-B]
                                         [-- options of analyze]
 """
 
@@ -88,7 +88,7 @@ def main() -> None:
             stages.append(json.loads(text))
             say(f"run {run + 1}: read {reads[-1].user:.2f} s, analyze {cost.user:.2f} s")
         palettes = {"result": TimedPalette.of_sidecar(sidecar)}
-        quality = evaluator.measure(args.clip, palettes, args.evaluator, args.frames)["result"]
+        quality = evaluator.measure(args.clip, palettes, args.frames)["result"]
     frames = len(palettes["result"].cuts)
     rows = []
     for name, costs in (("read the frames", reads), ("analyze", analyses)):
@@ -116,10 +116,8 @@ def main() -> None:
         rows.append([stage, wall, *structure, *cells])
     print(table(["stage", "wall s", "vertices", "blocks", "L", "L'"], rows))
 
-    heads = ["vertices", "blocks", *evaluator.FIT_HEADER, evaluator.outside_header([quality])]
-    fit = [*evaluator.fit_cells(quality), evaluator.outside_cell(quality)]
-    rows = [[quality.vertices, quality.blocks, *fit, f"{quality.farthest:.3f}"]]
-    print(table([*heads, "farthest"], rows))
+    row = [quality.vertices, quality.blocks, *evaluator.fit_cells(quality)]
+    print(table(["vertices", "blocks", *evaluator.FIT_HEADER], [row]))
 
 
 if __name__ == "__main__":

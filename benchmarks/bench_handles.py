@@ -4,24 +4,19 @@ Runs `palette4d analyze --vertices N` from the fewest vertices that a clip's str
 and measures each palette on every pixel; the static hull stands at one end, hulls of single frames
 that know nothing of each other at the other. A second table changes one option at a time.
 
-    python benchmarks/bench_handles.py CLIP [--evaluator PROGRAM] [--out DIR]
-                                       [--palette NAME=FILE ...]
+    python benchmarks/bench_handles.py CLIP [--out DIR]
 
-Prints Markdown; `--out` takes the plot of L' against vertices, handles.png. `--palette` measures
-and marks another program's palette, in the evaluator's form.
+Prints Markdown; `--out` takes the plot of L' against vertices, handles.png.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import evaluator
 import numpy as np
@@ -31,10 +26,6 @@ from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.options import AnalysisOptions
 
 from palette4d.media.clip import open_clip
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.transforms import Bbox
 
 SINGLY, THEN = 24, (26, 28, 32, 36, 40)
 DEFAULT = "default"
@@ -54,6 +45,7 @@ TRADES: dict[str, tuple[str, ...]] = {
 }
 STATIC = ("--method", "static")
 # The paper's rules alone, and with this program's hulls and shape terms.
+PURPLES = ("#8a5ab5", "#c9a9dd")
 PAPER = {"the paper's rules": PAPER_RULES, "--method paper": ("--method", "paper")}
 
 
@@ -104,65 +96,16 @@ def cells(x: Figures) -> list[str | None]:
         f"{x.colours:.1f}",
         *evaluator.fit_cells(x),
         f"{x.L_prime + HANDLE_COST * x.vertices:.4f}" if x.vertices else None,
-        evaluator.outside_cell(x),
-        f"{x.farthest:.3f}",
         f"{x.closest:.3f}",
         evaluator.share(x.concavity, 1),
     ]
 
 
-def header(outside: str) -> list[str]:
+def header() -> list[str]:
     """Return the heads of `cells`."""
     names = ["vertices", "blocks", "colours a frame", *evaluator.FIT_HEADER]
     price = f"L' + {HANDLE_COST} a vertex"
-    return [*names, price, outside, "farthest", "nearest colours", "deepest concavity"]
-
-
-# Where a label may stand beside its point: offsets in points, and how the text is aligned there.
-PLACES = (
-    (8, 0, "left", "center"),
-    (-8, 0, "right", "center"),
-    (0, -8, "center", "top"),
-    (0, 8, "center", "bottom"),
-    (5, -6, "left", "top"),
-    (5, 6, "left", "bottom"),
-    (-5, -6, "right", "top"),
-    (-5, 6, "right", "bottom"),
-)
-
-
-def put_labels(axes: Axes, labels: Sequence[tuple[str, str, float, float]]) -> None:
-    """Write labels (text, colour, x, y), each where it meets the fewest lines and other labels."""
-    paths = [line.get_path().transformed(line.get_transform()) for line in axes.lines]
-    points = [axes.transData.transform((x, y)) for _, _, x, y in labels]
-    taken: list[Bbox] = []
-    inside = axes.get_window_extent()
-
-    def crowding(box: Bbox) -> int:
-        beyond = inside.x0 > box.x0 or box.x1 > inside.x1 or box.y0 < inside.y0
-        hits = sum(path.intersects_bbox(box, filled=False) for path in paths)
-        hits += sum(box.contains(*point) for point in points) + sum(box.overlaps(t) for t in taken)
-        return hits + 100 * beyond
-
-    for text, colour, x, y in labels:
-        tries = []
-        for dx, dy, ha, va in PLACES:
-            note = axes.annotate(
-                text,
-                (x, y),
-                xytext=(dx, dy),
-                textcoords="offset points",
-                ha=ha,
-                va=va,
-                fontsize=8.5,
-                color=colour,
-            )
-            tries.append((crowding(note.get_window_extent()), len(tries), note))
-        _, _, best = min(tries, key=lambda one: one[:2])
-        for *_, note in tries:
-            if note is not best:
-                note.remove()
-        taken.append(best.get_window_extent())
+    return [*names, price, "nearest colours", "deepest concavity"]
 
 
 def draw(
@@ -181,9 +124,11 @@ def draw(
         x = [f.vertices for f in line]
         axes.plot(x, [f.L_prime for f in line], "-o", color="#1f5fa8", markersize=3.5, label="L'")
         axes.plot(x, [f.L for f in line], "--", color="#7aa5d6", linewidth=1.2, label="L")
-        axes.axhline(hulls.L, color="#888888", linewidth=1, linestyle=":")
-        for _, colour, f in marks:
-            axes.plot([f.vertices], [f.L_prime], "D", color=colour, markersize=6, zorder=3)
+        name = "L of single frames' hulls"
+        axes.axhline(hulls.L, color="#888888", linewidth=1, linestyle=":", label=name)
+        for name, colour, f in marks:
+            label = f"{name}: L' {f.L_prime:.4f}"
+            axes.plot([f.vertices], [f.L_prime], "D", color=colour, markersize=6, label=label)
         axes.set_xlabel("vertices: handles that a user has, over the whole clip")
         axes.set_ylabel("loss (eqs. 4 and 12), every pixel counted")
         # A palette of four colours may be far above all others: the line may leave at the top.
@@ -192,13 +137,7 @@ def draw(
         axes.margins(x=0.06)
         axes.grid(color="#e4e4e4", linewidth=0.7)
         axes.set_axisbelow(True)
-        axes.legend(loc="lower right", frameon=False, fontsize=9)
-        figure.draw_without_rendering()  # settles the layout: labels are placed in pixels
-        labels = [
-            (f"{name}  {f.L_prime:.4f}", colour, f.vertices, f.L_prime) for name, colour, f in marks
-        ]
-        labels.append(("L of single frames' hulls", "#666666", axes.get_xlim()[0], hulls.L))
-        put_labels(axes, labels)
+        axes.legend(frameon=False, fontsize=9)
         figure.savefig(output, dpi=120)
     say(f"wrote {output}")
 
@@ -208,17 +147,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     evaluator.add_arguments(parser)
     parser.add_argument("--out", metavar="DIR", type=Path, help="write handles.png here")
-    parser.add_argument(
-        "--palette",
-        metavar="NAME=FILE",
-        action="append",
-        default=[],
-        help="mark this palette too (JSON of the evaluator's form); may be given several times",
-    )
     args = parser.parse_args()
-    others = [text.partition("=")[::2] for text in args.palette]
-    if any(not file for _, file in others):
-        sys.exit(f"--palette: found {args.palette}, expected NAME=FILE")
     started = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         runs = Runs(args.clip, args.frames, Path(folder))
@@ -230,32 +159,25 @@ def main() -> None:
         palettes["static hull"] = runs.palette(*STATIC)
         uses = {w: runs(*options)["palette"] for w, options in TRADES.items()}
         palettes["hulls"] = single_hulls(args.clip, args.frames)
-        numbers = list(palettes["hulls"].cuts)
-        for name, file in others:
-            document = json.loads(Path(file).read_text(encoding="utf-8"))
-            palettes[name] = TimedPalette.of_document(document, numbers)
-        figures = evaluator.measure(args.clip, palettes, args.evaluator, args.frames)
-    outside = evaluator.outside_header(figures.values())
+        figures = evaluator.measure(args.clip, palettes, args.frames)
     rows = [["static hull (`--method static`)", *cells(figures["static hull"])]]
     rows += [[same_result(group), *cells(figures[f"asked {group[0]}"])] for group in groups(asked)]
     rows += [[code(name), *cells(figures[name])] for name in PAPER]
     rows += [["single frames' hulls", *cells(figures["hulls"])]]
-    rows += [[f"{name} (not this program)", *cells(figures[name])] for name, _ in others]
-    print("### L against vertices\n\n" + table(["palette", *header(outside)], rows))
+    print("### L against vertices\n\n" + table(["palette", *header()], rows))
     rows = []
     for words in TRADES:
         use = uses[words]
         splits = f"{use['splits']}, {use['merges']}"
         cell = f"{use['least_use']:.1%}"
         rows.append([code(words), *cells(figures[words]), splits, cell])
-    heads = ["options", *header(outside), "splits, merges", "use of the least used"]
+    heads = ["options", *header(), "splits, merges", "use of the least used"]
     print("### What is traded for what\n\n" + table(heads, rows))
     if args.out:
         args.out.mkdir(parents=True, exist_ok=True)
         marks = [("default", "#1f5fa8", figures[DEFAULT])]
         marks += [("static hull", "#3c8a4e", figures["static hull"])]
-        marks += [(name, "#8a5ab5", figures[name]) for name in PAPER]
-        marks += [(name, "#c1502e", figures[name]) for name, _ in others]
+        marks += [(name, c, figures[name]) for name, c in zip(PAPER, PURPLES, strict=True)]
         line = {f.vertices: f for f in (figures[f"asked {n}"] for n in asked)}
         chosen = [line[n] for n in sorted(line)]
         draw(chosen, marks, figures["hulls"], args.out / "handles.png")

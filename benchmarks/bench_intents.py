@@ -119,7 +119,7 @@ def main() -> None:
         colour[1:] *= chroma
     wanted = np.asarray(lab2rgb(lab))
     problem = frames, colours, wanted
-    palette = chang.extract(*chang.binned(distinct_colours(image)[:2] for image in images.values()))
+    palette = chang.extract(*chang.binned(distinct_colours(image) for image in images.values()))
     with tempfile.TemporaryDirectory() as folder:
         runs = Runs(args.clip, None, Path(folder))
         static = runs.path("--method", "static")
@@ -152,7 +152,7 @@ def measured(
     ]
     changes = []
     for frame in list(images)[::STEP]:
-        rgb, counts, _ = distinct_colours(images[frame])
+        rgb, counts = distinct_colours(images[frame])
         lab = rgb2lab(rgb)
         sky = (lab[:, 0] > SKY_LIGHTNESS) & (lab[:, 2] < 0)
         after = rgb2lab(recolour(frame, rgb[sky]))

@@ -5,7 +5,7 @@ figure 8 (eta2), figure 9 (vertex refinement), and the comparison of methods. Th
 `--method paper` with this program's own terms off; its defaults stand beside them. Of the paper's
 clips only SEASONS can be had; the rows of its other clips are the paper's numbers, for orientation.
 
-    python benchmarks/bench_paper.py CLIP [--evaluator PROGRAM] [--out DIR]
+    python benchmarks/bench_paper.py CLIP [--out DIR]
 
 Prints Markdown; `--out` takes the timelines of figures 8 and 9 and of the comparison (PNG).
 """
@@ -120,7 +120,7 @@ METHOD_NAMES = {
 }
 
 
-def figure_8(figures: dict[str, Figures], outside: str) -> str:
+def figure_8(figures: dict[str, Figures]) -> str:
     """Vertices and losses for each eta2, before and after refinement: figures 8 and 9."""
     rows = []
     for eta2 in ETA2S:
@@ -132,31 +132,31 @@ def figure_8(figures: dict[str, Figures], outside: str) -> str:
                     words,
                     x.vertices,
                     *evaluator.fit_cells(x),
-                    evaluator.outside_cell(x),
-                    f"{x.farthest:.3f}",
                     evaluator.share(x.concavity),
                     FIGURE_8[eta2],
                 ]
             )
-    header = ["η₂", "refinement", "vertices", *evaluator.FIT_HEADER, outside, "farthest"]
+    header = ["η₂", "refinement", "vertices", *evaluator.FIT_HEADER]
     header += ["deepest concavity", "vertices, PLAYGROUND, the paper"]
     return "### Figures 8 and 9: η₂, and vertex refinement\n\n" + table(header, rows)
 
 
-def comparison(
-    figures: dict[str, Figures], pooled: dict[str, float], is_seasons: bool, outside: str
-) -> str:
+def comparison(figures: dict[str, Figures], pooled: dict[str, float], is_seasons: bool) -> str:
     """Section 6.2's comparison."""
-    header = ["method", "vertices", "colours a frame", *evaluator.FIT_HEADER, outside]
-    header += ["farthest", "nearest colours", "deepest concavity", "C against all frames"]
+    header = ["method", "vertices", "colours a frame", *evaluator.FIT_HEADER]
+    header += ["nearest colours", "deepest concavity", "C against all frames"]
     if is_seasons:
         header.append("the paper's C")
     rows = []
     for name in METHOD_NAMES:
         x = figures[name]
         row: list[Any] = [METHOD_NAMES[name], x.vertices, f"{x.colours:.1f}"]
-        row += [*evaluator.fit_cells(x), evaluator.outside_cell(x), f"{x.farthest:.3f}"]
-        row += [f"{x.closest:.3f}", evaluator.share(x.concavity), f"{pooled[name]:.4f}"]
+        row += [
+            *evaluator.fit_cells(x),
+            f"{x.closest:.3f}",
+            evaluator.share(x.concavity),
+            f"{pooled[name]:.4f}",
+        ]
         if is_seasons:
             row.append(COMPACTNESS.get(name))
         rows.append(row)
@@ -172,7 +172,7 @@ def pooled_compactness(
     """
     rgb, counts = np.zeros((0, 3)), np.zeros(0)
     for _, image in open_clip(clip, frames=frames).iter_colours():
-        new, many, _ = evaluator.distinct_colours(image)
+        new, many = evaluator.distinct_colours(image)
         rgb, counts = evaluator.merged_colours(
             np.vstack([rgb, new]), np.concatenate([counts, many])
         )
@@ -192,7 +192,7 @@ def clusters(clip: str, frames: str | None) -> TimedPalette:
     def colours() -> Iterator[tuple[evaluator.F64, evaluator.F64]]:
         for number, image in open_clip(clip, frames=frames).iter_colours():
             numbers.append(number)
-            yield evaluator.distinct_colours(image)[:2]
+            yield evaluator.distinct_colours(image)
 
     rgb = chang.srgb(chang.extract(*chang.binned(colours())))
     ends, count = (min(numbers), max(numbers)), len(rgb)
@@ -256,11 +256,10 @@ def main() -> None:
         chosen = figure_8_options() | comparison_options()
         palettes = {words: runs.palette(*options) for words, options in chosen.items()}
         palettes["chang"] = clusters(args.clip, args.frames)
-        figures = evaluator.measure(args.clip, palettes, args.evaluator, args.frames)
+        figures = evaluator.measure(args.clip, palettes, args.frames)
         methods = {words: palettes[words] for words in METHOD_NAMES}
         pooled = pooled_compactness(args.clip, args.frames, methods)
-        outside = evaluator.outside_header(figures.values())
-        texts += [figure_8(figures, outside), comparison(figures, pooled, is_seasons, outside)]
+        texts += [figure_8(figures), comparison(figures, pooled, is_seasons)]
         if args.out:
             args.out.mkdir(parents=True, exist_ok=True)
 

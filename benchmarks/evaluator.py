@@ -1,21 +1,17 @@
 """What the benchmarks share: running the command, and measuring palettes with every pixel.
 
-A sidecar is turned into what any evaluator needs: a polyhedron for every frame, and the vertices
-and edges in time. It is measured by the core's exact distances on all colours of the clip, nothing
-binned; where `--evaluator` names a program of that kind (`evaluate.py FRAMES PALETTE --out FILE`),
-by that as well. The two must agree to 1e-6, and the program's figures are the ones quoted.
+A sidecar is turned into a polyhedron for every frame, and the vertices and edges in time. It is
+measured by the core's exact distances on all colours of the clip, nothing binned. A test compares
+these figures with those of an independent program.
 """
 
 from __future__ import annotations
 
 import argparse
-import concurrent.futures
 import dataclasses
 import json
-import os
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -35,7 +31,6 @@ I32 = NDArray[np.int32]
 LAMBDA, K_PIXELS, GAMMA = 50.0, 50.0, 0.01  # the paper's
 STEPS = 65535  # every 8- or 16-bit colour is a whole number of these
 LARGEST = 2**20  # of colours that are counted as such numbers
-AGREE = 1e-6
 # The paper's rules and nothing of this program's: no shape terms, the authors' merge distance.
 PAPER_RULES = (
     *("--method", "paper", "--set", "convexity=0", "--set", "separation=0"),
@@ -108,69 +103,17 @@ class TimedPalette:
         }
         return cls(cuts, np.zeros((0, 4)), np.zeros((0, 2), np.int32), [])
 
-    @classmethod
-    def of_document(cls, document: Mapping[str, Any], frames: Sequence[int]) -> TimedPalette:
-        """Read the evaluator's own form; the i-th palette belongs to the i-th frame."""
-        rgbs = {}
-        for number, entry in zip(frames, document["frames"], strict=True):
-            rgbs[number] = np.array(entry["vertices"], float)
-        vertices = np.array(document.get("vertices4d", []), float)
-        vertices = vertices.reshape(len(vertices), -1) if len(vertices) else np.zeros((0, 4))
-        if vertices.shape[1] == 3:  # a static palette
-            vertices = np.column_stack([vertices, np.zeros(len(vertices))])
-        vertices[:, 3] = frames[0] + vertices[:, 3] * (frames[-1] - frames[0])
-        edges = np.array(document.get("edges", []), np.int32).reshape(-1, 2)
-        blocks = [(float(a), float(b)) for a, b in document.get("blocks", [])]
-        # Meshes of other programs need not be oriented: they are taken without their faces.
-        cuts = {n: Cut(rgb, NO_FACES, _related(rgb, n, vertices, edges)) for n, rgb in rgbs.items()}
-        return cls(cuts, vertices, edges, blocks)
-
     @property
     def length(self) -> float:
         """Return the clip's length in frames, 1 for a single frame."""
         return max(float(max(self.cuts) - min(self.cuts)), 1.0)
 
-    def document(self) -> dict[str, Any]:
-        """Return the evaluator's form: time from 0 to 1."""
-        first = min(self.cuts)
-        vertices = self.vertices.copy()
-        vertices[:, 3] = (vertices[:, 3] - first) / self.length
-        return {
-            "frames": [
-                {
-                    "t": (n - first) / self.length,
-                    "vertices": cut.rgb.tolist(),
-                    "faces": cut.faces.tolist(),
-                }
-                for n, cut in self.cuts.items()
-            ],
-            "vertices4d": vertices.tolist(),
-            "edges": self.edges.tolist(),
-            "blocks": [list(block) for block in self.blocks],
-        }
-
-
-def _related(rgb: F64, frame: float, vertices: F64, edges: I32) -> NDArray[np.bool_]:
-    """Return which colours of a slice lie on edges with a vertex in common, (n, n)."""
-    out = np.eye(len(rgb), dtype=bool)
-    start, end = vertices[edges[:, 0]], vertices[edges[:, 1]]
-    # A slice at a vertex lies on the edges before and after it.
-    across = (start[:, 3] <= frame + 1e-6) & (frame - 1e-6 <= end[:, 3]) & (start[:, 3] < end[:, 3])
-    start, end, ends = start[across], end[across], edges[across]
-    share = ((frame - start[:, 3]) / (end[:, 3] - start[:, 3]))[:, None]
-    there = start[:, :3] + share * (end - start)[:, :3]
-    on = np.linalg.norm(rgb[:, None] - there[None], axis=2) < 1e-5
-    for side in (0, 1):
-        same = ends[:, None, side] == ends[None, :, side]
-        out |= (on.astype(int) @ same.astype(int) @ on.T.astype(int)) > 0
-    return out
-
 
 @dataclasses.dataclass(frozen=True)
 class Figures:
     """Means over the frames: R, C, L (eqs. 2 to 4), K (eq. 11), L' (eq. 12), share of pixels
-    outside, of those farther than 1/255 (by the program alone), colours a frame; the farthest
-    pixel, the least distance of two colours at one time and the deepest concavity of all frames."""
+    outside, colours a frame; the farthest pixel, the least distance of two colours at one time and
+    the deepest concavity of all frames."""
 
     vertices: int
     blocks: int
@@ -181,79 +124,33 @@ class Figures:
     K: float
     L_prime: float
     outside: float
-    outside_1_255: float | None
     farthest: float
     closest: float
     concavity: float
 
 
 def measure(
-    clip: str,
-    palettes: Mapping[str, TimedPalette],
-    program: Path | None = None,
-    frames: str | None = None,
+    clip: str, palettes: Mapping[str, TimedPalette], frames: str | None = None
 ) -> dict[str, Figures]:
     """Measure palettes on every pixel of the clip, in one pass over it."""
     rows: dict[str, list[list[float]]] = {name: [] for name in palettes}
     weights = _core.LossWeights(LAMBDA, K_PIXELS)
-    volume: list[NDArray[np.uint8]] = []
     for number, image in open_clip(clip, frames=frames).iter_colours():
-        rgb, counts, ignored = distinct_colours(image)
+        rgb, counts = distinct_colours(image)
         if len(rgb) == 0:
             continue
         tree = _core.ColourTree(rgb, counts)
         for name, palette in palettes.items():
             row = _core.palette_loss(tree, palette.cuts[number].rgb, NO_FACES, weights)
             rows[name].append([row[0], row[1], row[3], row[4]])
-        if program is not None:
-            volume.append(_eight_bit(image, ignored, number))
-    out = {name: _figures(palettes[name], np.array(rows[name])) for name in palettes}
-    if program is None:
-        say("measured on every pixel by palette4d's own exact losses (no --evaluator)")
-        return out
-    with tempfile.TemporaryDirectory() as folder:
-        np.save(Path(folder) / "frames.npy", np.stack(volume))
-        jobs = {
-            name: (Path(folder) / f"{i}.json", palettes[name]) for i, name in enumerate(palettes)
-        }
-        with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-            found = dict(
-                zip(jobs, pool.map(lambda job: _judge(program, *job), jobs.values()), strict=True)
-            )
-    worst = 0.0
-    for name, own in out.items():
-        other = found[name]
-        pairs = [(own.R, other["R"]), (own.C, other["C"]), (own.L, other["L"])]
-        pairs += [(own.outside, other["outside"]), (own.farthest, other["max_dist"])]
-        if "K" in other:
-            pairs.append((own.K, other["K"]))
-        worst = max(worst, *(abs(a - b) for a, b in pairs))
-        out[name] = dataclasses.replace(
-            own,
-            R=other["R"],
-            C=other["C"],
-            L=other["L"],
-            K=other.get("K", 0.0),
-            L_prime=other.get("L_prime", other["L"]),
-            outside=other["outside"],
-            outside_1_255=other["outside_1_255"],
-            farthest=other["max_dist"],
-        )
-    if worst > AGREE:
-        sys.exit(
-            f"{program} and palette4d differ by {worst:.2g} on the same pixels; expected at most "
-            f"{AGREE:g}: one of the two is wrong"
-        )
-    say(f"measured on every pixel by {program.name}; palette4d's losses differ by {worst:.1g}")
-    return out
+    return {name: _figures(palettes[name], np.array(rows[name])) for name in palettes}
 
 
-def distinct_colours(image: NDArray[np.float32]) -> tuple[F64, F64, int]:
-    """Return an image's distinct (n, 3) colours, their counts, and how many pixels do not count."""
+def distinct_colours(image: NDArray[np.float32]) -> tuple[F64, F64]:
+    """Return an image's distinct (n, 3) colours, and how many pixels have each."""
     pixels = image.reshape(-1, image.shape[-1])[:, :3]
-    finite = np.isfinite(pixels).all(axis=1)
-    rgb = pixels[finite].astype(np.float64)
-    return *merged_colours(unrounded(rgb), np.ones(len(rgb))), int((~finite).sum())
+    rgb = pixels[np.isfinite(pixels).all(axis=1)].astype(np.float64)
+    return merged_colours(unrounded(rgb), np.ones(len(rgb)))
 
 
 def merged_colours(rgb: F64, counts: F64) -> tuple[F64, F64]:
@@ -284,28 +181,6 @@ def unrounded(rgb: F64) -> F64:
     return out
 
 
-def _eight_bit(image: NDArray[np.float32], ignored: int, number: int) -> NDArray[np.uint8]:
-    """Return a frame as the program reads it."""
-    steps = np.rint(image * np.float32(255))
-    if ignored or not np.allclose(image, steps / np.float32(255), rtol=0, atol=1e-6):
-        sys.exit(
-            f"--evaluator reads 8-bit opaque frames, and frame {number} is none; "
-            "leave the option out: palette4d then measures every pixel itself"
-        )
-    return steps.astype(np.uint8)
-
-
-def _judge(program: Path, palette_file: Path, palette: TimedPalette) -> dict[str, float]:
-    """Run the evaluator's program on a palette; return its means."""
-    palette_file.write_text(json.dumps(palette.document()), encoding="utf-8")
-    result = palette_file.with_suffix(".out")
-    volume = palette_file.parent / "frames.npy"
-    command = [sys.executable, program, volume, palette_file, "--out", result]
-    subprocess.run(command, check=True, capture_output=True)
-    mean: dict[str, float] = json.loads(result.read_text(encoding="utf-8"))["mean"]
-    return mean
-
-
 def _figures(palette: TimedPalette, rows: F64) -> Figures:
     r, c, outside, _ = rows.mean(axis=0)
     loss = LAMBDA * r + c
@@ -321,7 +196,6 @@ def _figures(palette: TimedPalette, rows: F64) -> Figures:
         K=k,
         L_prime=float(loss + GAMMA * k),
         outside=float(outside),
-        outside_1_255=None,
         farthest=float(rows[:, 3].max()),
         closest=min(cut.closest() for cut in cuts),
         concavity=max(cut.concavity() for cut in cuts),
@@ -373,12 +247,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what all benchmarks of palettes take."""
     parser.add_argument("clip", metavar="CLIP", help="image sequence, folder or movie")
     parser.add_argument("--frames", metavar="A-B[xN]", help="only these frames")
-    parser.add_argument(
-        "--evaluator",
-        metavar="PROGRAM",
-        type=Path,
-        help="measure with this program too: PROGRAM FRAMES PALETTE --out FILE (8-bit clips)",
-    )
 
 
 # ---- text
@@ -396,25 +264,18 @@ def table(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
 
-FIT_HEADER = ("R", "C", "L", "K", "L'")
+FIT_HEADER = ("R", "C", "L", "K", "L'", "outside", "farthest")
 
 
 def fit_cells(x: Figures) -> list[str | None]:
     """Return the cells below `FIT_HEADER`; frames that are independent have no K."""
     smooth = [f"{x.K:.3f}", f"{x.L_prime:.4f}"] if x.vertices else [None, None]
-    return [f"{x.R:.5f}", f"{x.C:.4f}", f"{x.L:.4f}", *smooth]
+    return [
+        *(f"{x.R:.5f}", f"{x.C:.4f}", f"{x.L:.4f}", *smooth),
+        *(f"{x.outside:.1%}", f"{x.farthest:.3f}"),
+    ]
 
 
 def share(x: float, digits: int = 0) -> str | None:
     """Return a share as a percentage, None when it is not known."""
     return None if np.isnan(x) else f"{x:.{digits}%}"
-
-
-def outside_header(figures: Iterable[Figures]) -> str:
-    """Name the column of `outside_cell`."""
-    return "outside" if any(x.outside_1_255 is None for x in figures) else "outside > 1/255"
-
-
-def outside_cell(x: Figures) -> str:
-    """Return the share of pixels outside, of those farther than 1/255 where that is known."""
-    return f"{x.outside if x.outside_1_255 is None else x.outside_1_255:.1%}"

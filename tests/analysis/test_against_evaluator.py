@@ -104,6 +104,26 @@ def some_frames(clip, folder):
     return out
 
 
+def evaluators_form(palette):
+    """A palette as the evaluator reads it: time from 0 to 1."""
+    first = min(palette.cuts)
+    vertices = palette.vertices - [0, 0, 0, first]
+    vertices[:, 3] /= palette.length
+    return {
+        "frames": [
+            {
+                "t": (n - first) / palette.length,
+                "vertices": cut.rgb.tolist(),
+                "faces": cut.faces.tolist(),
+            }
+            for n, cut in palette.cuts.items()
+        ],
+        "vertices4d": vertices.tolist(),
+        "edges": palette.edges.tolist(),
+        "blocks": [list(block) for block in palette.blocks],
+    }
+
+
 def test_the_default_result_of_seasons(seasons, judge, measured, tmp_path):
     path = tmp_path / "seasons.p4d.json"
     command = [sys.executable, "-m", "palette4d", "analyze", str(seasons), "-o", str(path)]
@@ -112,7 +132,7 @@ def test_the_default_result_of_seasons(seasons, judge, measured, tmp_path):
     numbers, colours = exact_colours(clip, measured)
     palette = measured.TimedPalette.of_sidecar(path)
     palette = dataclasses.replace(palette, cuts={n: palette.cuts[n] for n in numbers})
-    result = judge(clip, palette.document())
+    result = judge(clip, evaluators_form(palette))
     polytope = _core.read_sidecar(str(path)).polytope
     blocks = [
         (s["first"], s["last"], s["tracks"], s["faces"])
