@@ -1,5 +1,6 @@
 // Any bytes at all as a sidecar, and what the node does with those that pass for one.
 #include <cstdint>
+#include <cstdlib>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -55,6 +56,12 @@ std::string outcome_of(const std::uint8_t* data, std::size_t size) {
         }
         return "accepted";
     } catch (const SidecarError& error) {
+        // In words, and in one line.
+        const std::string said = error.what();
+        if (error.found().empty() || error.expected().empty() ||
+            said.find('\n') != std::string::npos) {
+            std::abort();
+        }
         return kind_of(error.expected());
     }
 }

@@ -175,6 +175,50 @@ std::vector<unsigned char> recoloured(const palette4d::Sidecar& sidecar, double 
     return drawn(std::move(drawing), picture, area);
 }
 
+namespace {
+
+std::vector<unsigned char> rendered(strict::Instance& node, const strict::Picture& picture,
+                                    double time) {
+    strict::Picture output(picture.layout());
+    const OfxRectI& bounds = picture.layout().bounds;
+    CHECK(node.render(time, &picture, output, bounds) == kOfxStatOK);
+    return output.pixels(bounds);
+}
+
+}  // namespace
+
+Ready::Ready(std::string chosen, const std::string& context)
+    : path(std::move(chosen)), instance(plugin.create(context)) {
+    set("sidecar", path);
+}
+
+void Ready::change(const std::string& name, strict::Value value) {
+    set(name, std::move(value));
+    CHECK(instance->changed(name) == kOfxStatOK);
+}
+
+std::vector<unsigned char> Ready::render(const strict::Picture& picture, double time) const {
+    return rendered(*instance, picture, time);
+}
+
+bool Ready::says(const std::string& words) const {
+    return instance->text("status").find(words) != std::string::npos;
+}
+
+std::vector<unsigned char> Shown::render(strict::Instance& other, double time) const {
+    return rendered(other, source, time);
+}
+
+std::vector<unsigned char> Shown::edited(double frame) const {
+    return recoloured(parsed, frame, source, layout.bounds);
+}
+
+std::vector<unsigned char> Shown::edited(const palette4d::Edits& edits, double frame) const {
+    palette4d::Sidecar sidecar = parsed;
+    sidecar.edits = edits;
+    return recoloured(sidecar, frame, source, layout.bounds);
+}
+
 OfxRectI rect(int x1, int y1, int x2, int y2) { return {x1, y1, x2, y2}; }
 
 std::vector<strict::Layout> layouts() {

@@ -95,11 +95,34 @@ struct Ready {
     strict::Plugin plugin{bundle()};
     std::string path;
     palette4d::Sidecar parsed = palette4d::read_sidecar(path);
-    std::unique_ptr<strict::Instance> instance = plugin.create();
-    explicit Ready(std::string chosen = test::sidecar()) : path(std::move(chosen)) {
-        set("sidecar", path);
+    std::unique_ptr<strict::Instance> instance;
+    explicit Ready(std::string chosen = test::sidecar(),
+                   const std::string& context = kOfxImageEffectContextFilter);
+    void set(const std::string& name, strict::Value value) {
+        instance->set(name, std::move(value));
     }
-    void set(const char* name, strict::Value value) { instance->set(name, std::move(value)); }
+    /// As a user does: the host tells of it.
+    void change(const std::string& name, strict::Value value);
+    /// All pixels of a picture after a render, which succeeds.
+    std::vector<unsigned char> render(const strict::Picture& picture, double time) const;
+    bool says(const std::string& words) const;  ///< the status
+    const std::string& message() const { return instance->effect().persistent_message; }
+};
+
+/// The same with a picture of the default layout, as fill() makes it.
+struct Shown : Ready {
+    strict::Layout layout;
+    strict::Picture source{layout};
+    template <class... Arguments>
+    explicit Shown(Arguments&&... arguments) : Ready(std::forward<Arguments>(arguments)...) {
+        fill(source);
+    }
+    std::vector<unsigned char> render(double time = 2) const { return Ready::render(source, time); }
+    std::vector<unsigned char> render(strict::Instance& other, double time = 2) const;
+    std::vector<unsigned char> unchanged() const { return source.pixels(layout.bounds); }
+    /// As the core recolours it, by the sidecar's edits or others.
+    std::vector<unsigned char> edited(double frame = 12) const;
+    std::vector<unsigned char> edited(const palette4d::Edits& edits, double frame) const;
 };
 
 }  // namespace test

@@ -16,11 +16,6 @@ namespace {
 struct Picked : Ready {
     explicit Picked(bool moves = false)
         : Ready(test::write("picked.p4d.json", text_with_picks(moves))) {}
-    std::vector<unsigned char> rendered(const Picture& source, double time = 2) {
-        Picture output(source.layout());
-        CHECK(instance->render(time, &source, output, source.layout().bounds) == kOfxStatOK);
-        return output.pixels(source.layout().bounds);
-    }
     palette4d::Drawing matte(const std::string& id, double frame = 12) const {
         const palette4d::Slice slice = palette4d::slice_at(parsed.polytope, frame);
         palette4d::Drawing drawing;
@@ -95,11 +90,11 @@ TEST(picks_are_cleaned_up_as_in_a_file) {
         for (Layout layout : layouts()) {
             layout.bounds = rect(-9, 4, 78, 60);
             const Picture source = scene_of(layout);
-            const std::vector<unsigned char> cleaned = node.rendered(source);
+            const std::vector<unsigned char> cleaned = node.render(source, 2);
             CHECK(cleaned == recoloured(node.parsed, 12, source, layout.bounds));
             for (const double amount : {0.0, 0.5}) {
                 node.set("cleanUp", amount);
-                const auto found = node.rendered(source);
+                const auto found = node.render(source, 2);
                 CHECK(found == recoloured(node.parsed, 12, source, layout.bounds, 1, amount));
                 CHECK(found != cleaned);
             }
@@ -116,7 +111,7 @@ TEST(tiles_with_their_region_of_interest_are_the_whole_picture) {
             const Picture source = scene_of(layout);
             for (const int output : {0, 4}) {
                 node.set("output", output);
-                const auto whole = node.rendered(source);
+                const auto whole = node.render(source, 2);
                 Picture tiles(layout);
                 for (int y = layout.bounds.y1; y < layout.bounds.y2; y += 13) {
                     for (int x = layout.bounds.x1; x < layout.bounds.x2; x += 37) {
@@ -140,7 +135,7 @@ TEST(the_region_of_interest_is_what_the_filter_sees) {
     const int support = palette4d::clean_up_support(palette4d::clean_up_cell(1));
     const Layout layout = large(rect(0, 0, 200, 200));
     const Picture source = scene_of(layout);
-    const auto whole = node.rendered(source);
+    const auto whole = node.render(source, 2);
     // What lies beyond changes nothing.
     Picture other = source;
     const OfxRectI window = rect(80, 83, 99, 90);
@@ -185,13 +180,13 @@ TEST(the_region_of_interest_is_what_the_filter_sees) {
 TEST(a_lut_is_not_cleaned_up) {
     Picked node;
     const Picture source = scene_of(large(rect(0, 0, 64, 48)));
-    const auto cleaned = node.rendered(source);
+    const auto cleaned = node.render(source, 2);
     node.set("cleanUp", 0.0);
-    const auto plain = node.rendered(source);
+    const auto plain = node.render(source, 2);
     CHECK(cleaned != plain);
     node.set("cleanUp", 1.0);
     node.instance->extra_arguments["OfxImageEffectPropNoSpatialAwareness"] = std::string("true");
-    CHECK(node.rendered(source) == plain);
+    CHECK(node.render(source, 2) == plain);
 }
 
 TEST(colours_far_from_picked_ones_keep_their_bits) {
@@ -222,7 +217,7 @@ TEST(the_matte_of_a_pick) {
             layout.bounds = rect(-9, 4, 50, 40);
             const Picture source = scene_of(layout);
             const palette4d::Drawing drawing = node.matte("p" + std::to_string(number));
-            CHECK(node.rendered(source) == drawn(drawing, source, layout.bounds));
+            CHECK(node.render(source, 2) == drawn(drawing, source, layout.bounds));
         }
     }
     // White at a picked colour, black far away.
@@ -249,7 +244,7 @@ TEST(a_pick_that_is_not_there_is_said) {
     node.set("output", 4);
     node.set("pick", 2);
     const Picture source = scene_of(large(rect(0, 0, 16, 16)));
-    CHECK(node.rendered(source) == source.pixels(source.layout().bounds));
+    CHECK(node.render(source, 2) == source.pixels(source.layout().bounds));
     const std::string& message = node.instance->effect().persistent_message;
     EXPECT(message ==
                "Matte of a pick: the sidecar has no pick p2, expected one of p1, p3, p4; "

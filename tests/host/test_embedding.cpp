@@ -10,48 +10,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Project {
-    Plugin plugin{bundle()};
-    std::unique_ptr<Instance> node = plugin.create();
-    palette4d::Sidecar parsed = palette4d::parse_sidecar(sidecar_text(), "");
-    Layout layout;
-    Picture source{layout};
-    Project() { fill(source); }
-    void choose(const std::string& path) {
-        node->set("sidecar", path);
-        CHECK(node->changed("sidecar") == kOfxStatOK);
-    }
-    std::vector<unsigned char> render(Instance& instance) {
-        Picture output(layout);
-        CHECK(instance.render(4, &source, output, layout.bounds) == kOfxStatOK);
-        return output.pixels(layout.bounds);
-    }
-    std::vector<unsigned char> edited() const {
-        return recoloured(parsed, 14, source, layout.bounds);
-    }
-    std::vector<unsigned char> unchanged() const { return source.pixels(layout.bounds); }
-    bool says(const std::string& words) {
-        return node->text("status").find(words) != std::string::npos;
-    }
-};
-
 }  // namespace
 
 TEST(an_embedded_sidecar_travels_with_the_project) {
-    Project project;
+    Shown project;
     const std::string path = sidecar();
-    project.choose(path);
-    CHECK(project.node->text("embedded").empty());
-    project.node->set("embed", 1);
-    CHECK(project.node->changed("embed") == kOfxStatOK);
-    CHECK(project.node->text("embedded") == sidecar_text());
+    project.change("sidecar", path);
+    CHECK(project.instance->text("embedded").empty());
+    project.change("embed", 1);
+    CHECK(project.instance->text("embedded") == sidecar_text());
     CHECK(project.says("a copy is in the project"));
-    CHECK(project.render(*project.node) == project.edited());
+    CHECK(project.render() == project.edited());
     // On another machine: the project's parameters, and no file.
     fs::remove(fs::u8path(path));
     const auto there = project.plugin.create();
     for (const char* name : {"sidecar", "embedded", "embed", "clipFolder"}) {
-        there->set(name, project.node->value(name));
+        there->set(name, project.instance->value(name));
     }
     CHECK(project.render(*there) == project.edited());
     CHECK(there->effect().persistent_message.empty());
@@ -74,86 +48,82 @@ TEST(an_embedded_sidecar_travels_with_the_project) {
 }
 
 TEST(the_copy_that_goes_last_is_missed_at_once) {
-    Project project;
+    Shown project;
     const std::string path = sidecar();
-    project.choose(path);
-    project.node->set("embed", 1);
-    CHECK(project.node->changed("embed") == kOfxStatOK);
+    project.change("sidecar", path);
+    project.change("embed", 1);
     fs::remove(fs::u8path(path));
-    CHECK(project.render(*project.node) == project.edited());
-    project.node->set("embed", 0);
-    CHECK(project.node->changed("embed") == kOfxStatOK);
-    CHECK(project.node->text("status").find("does not exist") != std::string::npos);
+    CHECK(project.render() == project.edited());
+    project.change("embed", 0);
+    CHECK(project.instance->text("status").find("does not exist") != std::string::npos);
 }
 
 TEST(the_copy_stands_in_for_a_file_that_cannot_be_read) {
-    Project project;
+    Shown project;
     const std::string path = sidecar();
-    project.choose(path);
-    project.node->set("embed", 1);
-    CHECK(project.node->changed("embed") == kOfxStatOK);
+    project.change("sidecar", path);
+    project.change("embed", 1);
     write("clip.p4d.json", sidecar_text().substr(0, 300));
-    CHECK(project.render(*project.node) == project.edited());
+    CHECK(project.render() == project.edited());
     // The user hears of the file, and the copy is not replaced by what is broken.
-    const std::string& said = project.node->effect().persistent_message;
+    const std::string& said = project.instance->effect().persistent_message;
     EXPECT(said.find(path) != std::string::npos, said);
-    CHECK(project.node->changed("reload") == kOfxStatOK);
+    CHECK(project.instance->changed("reload") == kOfxStatOK);
     CHECK(project.says("the project's copy, because " + path));
-    CHECK(project.node->text("embedded") == sidecar_text());
+    CHECK(project.instance->text("embedded") == sidecar_text());
     const std::string plain = sidecar_text(false);
     write("clip.p4d.json", plain);
-    CHECK(project.render(*project.node) == project.unchanged());
-    CHECK(project.node->effect().persistent_message.empty());
+    CHECK(project.render() == project.unchanged());
+    CHECK(project.instance->effect().persistent_message.empty());
     // Of two that are broken the file is named.
     write("clip.p4d.json", "no JSON");
-    project.node->set("embedded", std::string("no JSON either"));
-    CHECK(project.render(*project.node) == project.unchanged());
+    project.instance->set("embedded", std::string("no JSON either"));
+    CHECK(project.render() == project.unchanged());
     EXPECT(said.find(path) == 0 && said.find("project") == std::string::npos, said);
 }
 
 TEST(a_broken_copy_is_said_to_be_one) {
-    Project project;
-    project.node->set("sidecar", std::string("/nowhere/at.all"));
+    Shown project;
+    project.instance->set("sidecar", std::string("/nowhere/at.all"));
     for (const std::string& text : {std::string("no JSON"), sidecar_text().substr(0, 300)}) {
-        project.node->set("embedded", text);
-        CHECK(project.render(*project.node) == project.unchanged());
-        const std::string& said = project.node->effect().persistent_message;
+        project.instance->set("embedded", text);
+        CHECK(project.render() == project.unchanged());
+        const std::string& said = project.instance->effect().persistent_message;
         EXPECT(said.find("the project's copy") != std::string::npos, said);
     }
     // More copies than are remembered, each its own.
     for (int i = 0; i < 20; ++i) {
-        project.node->set("embedded",
-                          sidecar_text() + std::string(static_cast<std::size_t>(i), ' '));
-        CHECK(project.render(*project.node) == project.edited());
+        project.instance->set("embedded",
+                              sidecar_text() + std::string(static_cast<std::size_t>(i), ' '));
+        CHECK(project.render() == project.edited());
     }
 }
 
 TEST(the_clips_folder_is_filled_in) {
-    Project project;
+    Shown project;
     fs::create_directories(folder() / "frames");
     std::string text = sidecar_text();
     const std::string source = "box.####.exr";
     text.replace(text.find(source), source.size(), "../frames/" + source);
     fs::create_directories(folder() / "sidecars");
     const std::string path = write("sidecars/s.p4d.json", text);
-    project.choose(path);
-    CHECK(project.node->text("clipFolder") == (folder() / "frames").u8string());
+    project.change("sidecar", path);
+    CHECK(project.instance->text("clipFolder") == (folder() / "frames").u8string());
     // Moved beside the clip: found there.
     fs::rename(folder() / "sidecars" / "s.p4d.json", folder() / "frames" / "s.p4d.json");
-    CHECK(project.render(*project.node) == project.edited());
+    CHECK(project.render() == project.edited());
     // What the user says stays until another sidecar is chosen.
-    project.node->set("clipFolder", std::string("/elsewhere"));
-    CHECK(project.node->changed("clipFolder") == kOfxStatOK);
-    CHECK(project.node->text("clipFolder") == "/elsewhere");
+    project.change("clipFolder", std::string("/elsewhere"));
+    CHECK(project.instance->text("clipFolder") == "/elsewhere");
 }
 
 TEST(the_revision_names_what_is_shown) {
     // A host keeps frames by the parameters: when the content changes, so does one of them.
-    Project project;
-    Instance& node = *project.node;
+    Shown project;
+    Instance& node = *project.instance;
     const std::string path = sidecar();
     CHECK(node.text("revision").empty());
-    project.choose(path);
+    project.change("sidecar", path);
     std::set<std::string> seen = {"", node.text("revision")};
     CHECK(seen.size() == 2);
     // The same content, told again: nothing to do.

@@ -12,22 +12,6 @@ using namespace test;
 
 namespace {
 
-struct Scene {
-    Plugin plugin{bundle()};
-    std::unique_ptr<Instance> instance = plugin.create();
-    Layout layout;
-    Picture source{layout}, output{layout};
-    Scene() { fill(source); }
-
-    std::vector<unsigned char> render(double time = 2) {
-        output = Picture(layout);
-        CHECK(instance->render(time, &source, output, layout.bounds) == kOfxStatOK);
-        return output.pixels(layout.bounds);
-    }
-    std::vector<unsigned char> unchanged() const { return source.pixels(layout.bounds); }
-    std::string message() { return instance->effect().persistent_message; }
-};
-
 /// Moves the file's time out of the span in which a second change could hide.
 void age(const std::string& path, int seconds) {
     namespace fs = std::filesystem;
@@ -38,7 +22,7 @@ void age(const std::string& path, int seconds) {
 }  // namespace
 
 TEST(unusable_sidecars_pass_the_picture_through) {
-    Scene scene;
+    Shown scene;
     const std::string whole = sidecar_text();
     std::vector<std::pair<std::string, std::string>> bad = {
         {(folder() / "missing.p4d.json").u8string(), "does not exist"},
@@ -77,7 +61,7 @@ TEST(unusable_sidecars_pass_the_picture_through) {
 }
 
 TEST(a_message_stays_until_its_cause_goes) {
-    Scene scene;
+    Shown scene;
     scene.instance->set("sidecar", std::string("/nowhere.p4d.json"));
     for (int i = 0; i < 5; ++i) {
         scene.render(i);
@@ -95,12 +79,12 @@ TEST(a_message_stays_until_its_cause_goes) {
 }
 
 TEST(a_changed_sidecar_is_read_again) {
-    Scene scene;
+    Shown scene;
     const std::string path = sidecar();
     const palette4d::Sidecar edited = palette4d::read_sidecar(path);
     scene.instance->set("sidecar", path);
     const auto first = scene.render();
-    CHECK(first == recoloured(edited, 12, scene.source, scene.layout.bounds));
+    CHECK(first == scene.edited());
     age(path, 100);
     CHECK(scene.render() == first);
     // Another size, within the same second.
@@ -135,7 +119,7 @@ TEST(a_changed_sidecar_is_read_again) {
 }
 
 TEST(a_file_of_the_same_size_and_time_is_another_file) {
-    Scene scene;
+    Shown scene;
     const std::string path = sidecar();
     const std::string swapped =
         sidecar_text().replace(sidecar_text().find("[0.2, 0.7, 0.1]"), 15, "[0.2, 0.1, 0.7]");
@@ -159,7 +143,7 @@ TEST(a_file_of_the_same_size_and_time_is_another_file) {
 }
 
 TEST(the_status_follows_the_file) {
-    Scene scene;
+    Shown scene;
     Instance& node = *scene.instance;
     const std::string path = sidecar(), whole = sidecar_text(), plain = sidecar_text(false);
     const std::string good = "box: frames 10-20 at 24 fps, 16 handles, ";
@@ -207,7 +191,7 @@ TEST(the_status_follows_the_file) {
 
 TEST(the_status_is_set_only_where_it_may_be) {
     // The strict host takes a setting anywhere else, and one in answer to a setting, for a fault.
-    Scene scene;
+    Shown scene;
     Instance& node = *scene.instance;
     node.set("sidecar", sidecar());
     CHECK(node.changed("sidecar") == kOfxStatOK);
@@ -248,7 +232,7 @@ TEST(a_host_that_says_nothing_of_a_change_is_answered_once) {
     config.missing_properties = {kOfxPropName, kOfxPropChangeReason};
     config.null_functions = {"paramGetValue"};
     Host::get().configure(config);
-    Scene scene;
+    Shown scene;
     for (int i = 0; i < 3; ++i) {
         const int before = scene.instance->settings("status");
         CHECK(scene.instance->changed(kOfxTypeParameter, "strength", kOfxChangeUserEdited) ==
@@ -258,7 +242,7 @@ TEST(a_host_that_says_nothing_of_a_change_is_answered_once) {
 }
 
 TEST(one_file_by_several_names) {
-    Scene scene;
+    Shown scene;
     const std::string path = sidecar();
     std::filesystem::create_directories(folder() / "deep");
     scene.instance->set("sidecar", path);
@@ -283,7 +267,7 @@ TEST(one_file_by_several_names) {
 }
 
 TEST(more_sidecars_than_the_cache_holds) {
-    Scene scene;
+    Shown scene;
     const std::string text = sidecar_text();
     std::vector<unsigned char> expected;
     for (int i = 0; i < 80; ++i) {
@@ -298,7 +282,7 @@ TEST(more_sidecars_than_the_cache_holds) {
 TEST(a_sidecar_rewritten_while_rendering) {
     // Whole, truncated, gone and other files come and go under the renders: each picture is one of
     // the honest three (edited so, otherwise, or not), never a mixture.
-    Scene scene;
+    Shown scene;
     const std::string path = sidecar();
     const std::string whole = sidecar_text(), plain = sidecar_text(false);
     const auto edited =
@@ -421,7 +405,7 @@ TEST(sixteen_instances_in_eight_threads_while_the_sidecar_is_swapped) {
     // For PALETTE4D_LOAD_SECONDS (2) the file changes 100 times a second.
     const char* const given = std::getenv("PALETTE4D_LOAD_SECONDS");
     const auto length = std::chrono::seconds(given ? std::atoi(given) : 2);
-    Scene scene;
+    Shown scene;
     const std::string path = sidecar();
     const std::string texts[] = {sidecar_text(), sidecar_text(false)};
     const auto edited =

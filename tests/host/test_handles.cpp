@@ -8,35 +8,15 @@ using namespace test;
 
 namespace {
 
-struct Graded {
-    Plugin plugin{bundle()};
-    std::string path = sidecar();
-    palette4d::Sidecar parsed = palette4d::read_sidecar(path);
-    std::unique_ptr<Instance> node = plugin.create();
-    Layout layout;
-    Picture source{layout};
-    Graded() {
-        fill(source);
-        choose(path);
-    }
-    void choose(const std::string& chosen) {
-        node->set("sidecar", chosen);
-        CHECK(node->changed("sidecar") == kOfxStatOK);
-    }
-    std::vector<unsigned char> render(double time) {
-        Picture output(layout);
-        CHECK(node->render(time, &source, output, layout.bounds) == kOfxStatOK);
-        return output.pixels(layout.bounds);
-    }
+struct Graded : Shown {
+    Graded() { change("sidecar", path); }
     /// What the core makes of the sidecar with these edits.
     std::vector<unsigned char> expected(const palette4d::Edits& edits, double time) const {
-        palette4d::Sidecar other = parsed;
-        other.edits = edits;
-        return recoloured(other, 10 + time, source, layout.bounds);
+        return edited(edits, 10 + time);
     }
     void use(const std::string& slot, const Colour& colour) {
-        node->set(slot, colour);
-        node->set(slot + "On", 1);
+        set(slot, colour);
+        set(slot + "On", 1);
     }
 };
 
@@ -52,7 +32,7 @@ TEST(unused_handles_leave_the_sidecars_edits_alone) {
     for (const double level : {0.0, 1.0, 0.5, -7.0, std::numeric_limits<double>::quiet_NaN()}) {
         for (int slot = 1; slot <= 32; ++slot) {
             const std::string name = "handle" + std::string(slot < 10 ? "0" : "");
-            graded.node->set(name + std::to_string(slot), Colour{level, level, level});
+            graded.instance->set(name + std::to_string(slot), Colour{level, level, level});
         }
         CHECK(graded.render(3) == graded.expected(graded.parsed.edits, 3));
     }
@@ -72,32 +52,32 @@ TEST(a_handle_of_the_host_overrides_the_sidecars_edit) {
         CHECK(graded.render(time) != graded.expected(graded.parsed.edits, time));
     }
     // Sidecar: as if nothing were set here.
-    graded.node->set("editsFrom", 0);
+    graded.instance->set("editsFrom", 0);
     CHECK(graded.render(5) == graded.expected(graded.parsed.edits, 5));
     // Host: what is set here alone; a stop that is not has gone.
-    graded.node->set("editsFrom", 1);
+    graded.instance->set("editsFrom", 1);
     palette4d::Edits alone;
     alone.vertex_rgb.resize(16);
     alone.vertex_rgb[1] = edits.vertex_rgb[1];
     alone.vertex_rgb[4] = edits.vertex_rgb[4];
     alone.stops = edits.stops;
     CHECK(graded.render(5) == graded.expected(alone, 5));
-    graded.node->set("handle17On", 0);
+    graded.instance->set("handle17On", 0);
     alone.stops.clear();
     CHECK(graded.render(5) == graded.expected(alone, 5));
     // And with none in use there is nothing to do, and the host hears so.
-    graded.node->set("handle02On", 0);
-    graded.node->set("handle05On", 0);
+    graded.instance->set("handle02On", 0);
+    graded.instance->set("handle05On", 0);
     std::string clip;
     double time = 0;
-    CHECK(graded.node->is_identity(5, clip, time) == kOfxStatOK);
-    CHECK(graded.render(5) == graded.source.pixels(graded.layout.bounds));
+    CHECK(graded.instance->is_identity(5, clip, time) == kOfxStatOK);
+    CHECK(graded.render(5) == graded.unchanged());
 }
 
 TEST(keyframes_of_a_handle_are_read_at_the_time_of_the_render) {
     Graded graded;
     graded.use("handle01", {0, 0, 0});
-    graded.node->animate("handle01", {{0, Colour{0.1, 0.1, 0.1}}, {8, Colour{0.9, 0.5, 0.1}}});
+    graded.instance->animate("handle01", {{0, Colour{0.1, 0.1, 0.1}}, {8, Colour{0.9, 0.5, 0.1}}});
     std::vector<unsigned char> before;
     for (const double time : {0.0, 2.0, 4.0, 6.5, 8.0, 9.0}) {
         const double w = std::min(time / 8, 1.0);
@@ -120,16 +100,14 @@ TEST(one_sidecar_two_instances_two_grades) {
     palette4d::Edits edits = graded.parsed.edits;
     edits.vertex_rgb[2] = palette4d::Vec3{1, 0, 1};
     for (int round = 0; round < 3; ++round) {
-        Picture output(graded.layout);
-        CHECK(other->render(2, &graded.source, output, graded.layout.bounds) == kOfxStatOK);
-        CHECK(output.pixels(graded.layout.bounds) == graded.expected(edits, 2));
+        CHECK(graded.render(*other) == graded.expected(edits, 2));
         CHECK(graded.render(2) == graded.expected(graded.parsed.edits, 2));
     }
 }
 
 TEST(handles_show_what_the_sidecar_holds) {
     Graded graded;
-    Instance& node = *graded.node;
+    Instance& node = *graded.instance;
     CHECK(node.properties("handle01").text(kOfxPropLabel) == "v0, frame 10");
     CHECK(node.properties("handle16").text(kOfxPropLabel) == "v15, frame 20");
     CHECK(node.properties("handle17").text(kOfxPropLabel) == "s1, stop at 15");
@@ -153,7 +131,7 @@ TEST(handles_show_what_the_sidecar_holds) {
     CHECK(node.changed("strength") == kOfxStatOK);
     CHECK(node.settings("handle02") == before);
     // Without a sidecar nothing is lost.
-    graded.choose("");
+    graded.change("sidecar", std::string());
     CHECK(std::get<int>(node.value("handle01On")) == 1);
 }
 
@@ -164,39 +142,38 @@ TEST(labels_have_the_names_of_the_colours_where_the_sidecar_has_them) {
     const std::size_t at = text.find(id);
     CHECK(at != std::string::npos);
     text.replace(at, id.size(), id + ", \"name\": \"deep grey\"");
-    graded.choose(write("named.p4d.json", text));
-    Instance& node = *graded.node;
+    graded.change("sidecar", write("named.p4d.json", text));
+    Instance& node = *graded.instance;
     CHECK(node.properties("handle01").text(kOfxPropLabel) == "v0: deep grey, 10");
     CHECK(node.properties("handle16").text(kOfxPropLabel) == "v15, frame 20");
 }
 
 TEST(without_a_sidecar_the_slots_are_as_they_were_described) {
     Graded graded;
-    Instance& node = *graded.node;
+    Instance& node = *graded.instance;
     const auto shows_handles = [&] {
         return secret(node, "handle18") &&
                node.properties("handle01").text(kOfxPropLabel) == "v0, frame 10";
     };
     const std::string path = node.text("sidecar");
     // One that cannot be read leaves all as it is: it may come back.
-    graded.choose("/nowhere/at.all");
+    graded.change("sidecar", std::string("/nowhere/at.all"));
     CHECK(shows_handles());
-    graded.choose("");
+    graded.change("sidecar", std::string());
     CHECK(node.properties("handle01").text(kOfxPropLabel) == "Handle 1");
     for (const char* name : {"handle01", "handle18", "handle32On"}) CHECK(!secret(node, name));
-    graded.choose(path);
+    graded.change("sidecar", path);
     CHECK(shows_handles());
 }
 
 TEST(changing_a_colour_brings_it_into_use) {
     Graded graded;
-    Instance& node = *graded.node;
+    Instance& node = *graded.instance;
     node.set("handle02", Colour{1, 1, 0});
     // The host's own interpolation of keys is no edit, nor is the plugin's own setting.
     CHECK(node.changed(kOfxTypeParameter, "handle02", kOfxChangeTime) == kOfxStatOK);
     CHECK(std::get<int>(node.value("handle02On")) == 0);
-    node.set("handle02", Colour{1, 1, 0});
-    CHECK(node.changed("handle02") == kOfxStatOK);
+    graded.change("handle02", Colour{1, 1, 0});
     CHECK(std::get<int>(node.value("handle02On")) == 1);
     CHECK(std::get<Colour>(node.value("handle02")) == (Colour{1, 1, 0}));
     // It holds on to its handle from now on.
@@ -205,11 +182,9 @@ TEST(changing_a_colour_brings_it_into_use) {
     edits.vertex_rgb[1] = palette4d::Vec3{1, 1, 0};
     CHECK(graded.render(1) == graded.expected(edits, 1));
     // Out of use it keeps its colour, and is back with it when it is switched on again.
-    node.set("handle02On", 0);
-    CHECK(node.changed("handle02On") == kOfxStatOK);
+    graded.change("handle02On", 0);
     CHECK(graded.render(1) == graded.expected(graded.parsed.edits, 1));
-    node.set("handle02On", 1);
-    CHECK(node.changed("handle02On") == kOfxStatOK);
+    graded.change("handle02On", 1);
     CHECK(std::get<Colour>(node.value("handle02")) == (Colour{1, 1, 0}));
     CHECK(graded.render(1) == graded.expected(edits, 1));
     // All of them.
@@ -224,7 +199,7 @@ TEST(changing_a_colour_brings_it_into_use) {
 
 TEST(the_same_colour_after_a_reset_is_an_edit_again) {
     Graded graded;
-    Instance& node = *graded.node;
+    Instance& node = *graded.instance;
     for (int turn = 0; turn < 3; ++turn) {
         node.set("handle02", Colour{1, 1, 0});
         CHECK(node.changed("handle02") == kOfxStatOK);
@@ -239,7 +214,7 @@ TEST(the_same_colour_after_a_reset_is_an_edit_again) {
 
 TEST(colours_that_change_together_are_all_kept) {
     Graded graded;
-    Instance& node = *graded.node;
+    Instance& node = *graded.instance;
     // A preset, or several values pasted: all are there before the first is told.
     node.set("handle02", Colour{1, 1, 0});
     node.set("handle03", Colour{0, 1, 1});
@@ -254,10 +229,9 @@ TEST(colours_that_change_together_are_all_kept) {
 
 TEST(an_edit_that_the_host_undoes_is_undone) {
     Graded graded;
-    Instance& node = *graded.node;
+    Instance& node = *graded.instance;
     const Colour before = std::get<Colour>(node.value("handle02"));
-    node.set("handle02", Colour{1, 1, 0});
-    CHECK(node.changed("handle02") == kOfxStatOK);
+    graded.change("handle02", Colour{1, 1, 0});
     // With it what the node has set, as hosts keep them together.
     node.set("handle02", before);
     node.set("handle02On", 0);
@@ -271,12 +245,12 @@ TEST(an_edit_that_the_host_undoes_is_undone) {
 
 TEST(what_the_node_sets_is_undone_in_one_step) {
     Graded graded;
-    Instance& node = *graded.node;
+    Instance& node = *graded.instance;
     // Choosing the sidecar has given colours to its 17 handles, and the clip's folder.
     CHECK(node.undo_steps().size() == 1 && node.undo_steps()[0].before.size() == 18);
     // What is as it should be already is no step.
     const int folders = node.settings("clipFolder");
-    graded.choose(graded.path);
+    graded.change("sidecar", graded.path);
     CHECK(node.settings("clipFolder") == folders && node.undo_steps().size() == 1);
     // To say which frame is shown is no step.
     node.shown_time = 3;
@@ -284,10 +258,8 @@ TEST(what_the_node_sets_is_undone_in_one_step) {
     CHECK(node.changed("strength") == kOfxStatOK);
     CHECK(node.undo_steps().size() == 1);
     const palette4d::Edits before = graded.parsed.edits;
-    node.set("handle02", Colour{1, 1, 0});
-    CHECK(node.changed("handle02") == kOfxStatOK);
-    node.set("handle03", Colour{1, 0, 1});
-    CHECK(node.changed("handle03") == kOfxStatOK);
+    graded.change("handle02", Colour{1, 1, 0});
+    graded.change("handle03", Colour{1, 0, 1});
     CHECK(node.undo_steps().size() == 3 && node.undo_steps()[2].before.size() == 2);
     CHECK(node.changed("resetHandles") == kOfxStatOK);
     CHECK(node.undo_steps().size() == 4);
@@ -305,7 +277,7 @@ TEST(what_the_node_sets_is_undone_in_one_step) {
 
 TEST(colours_that_the_host_takes_back_are_no_edits) {
     Graded graded;
-    Instance& node = *graded.node;
+    Instance& node = *graded.instance;
     const Colour begun = std::get<Colour>(node.value("handle02"));
     const auto none_in_use = [&] {
         for (const char* use : {"handle01On", "handle02On", "handle17On"}) {
@@ -333,14 +305,13 @@ TEST(colours_that_the_host_takes_back_are_no_edits) {
     CHECK(std::get<Colour>(node.value("handle02")) == (Colour{0.9, 0.1, 0.1}));
     CHECK(node.undo_steps().size() == 1);
     // One of them alone is an edit, of the colour that it had before, too.
-    node.set("handle03", Colour{0, 0, 0});
-    CHECK(node.changed("handle03") == kOfxStatOK);
+    graded.change("handle03", Colour{0, 0, 0});
     CHECK(std::get<int>(node.value("handle03On")) == 1);
 }
 
 TEST(colours_that_were_given_later_are_taken_back_by_themselves) {
     Graded graded;
-    Instance& node = *graded.node;
+    Instance& node = *graded.instance;
     write("clip.p4d.json", sidecar_text(false));
     CHECK(node.changed("reload") == kOfxStatOK);
     CHECK(node.undo_steps().size() == 2);
@@ -354,7 +325,7 @@ TEST(colours_that_were_given_later_are_taken_back_by_themselves) {
 
 TEST(keyframes_that_begin_with_the_colour_shown_are_an_edit) {
     Graded graded;
-    Instance& node = *graded.node;
+    Instance& node = *graded.instance;
     node.animate("handle02", {{0.0, Colour{0.2, 0.7, 0.1}}, {8.0, Colour{1, 1, 1}}});
     CHECK(node.changed("handle02") == kOfxStatOK);
     CHECK(std::get<int>(node.value("handle02On")) == 1);
@@ -375,11 +346,10 @@ TEST(a_host_without_undo_steps_has_the_same_node) {
     for (const Config& config : configs) {
         Host::get().configure(config);
         Graded graded;
-        CHECK(std::get<Colour>(graded.node->value("handle02")) == (Colour{0.2, 0.7, 0.1}));
-        graded.node->set("handle02", Colour{1, 1, 0});
-        CHECK(graded.node->changed("handle02") == kOfxStatOK);
-        CHECK(std::get<int>(graded.node->value("handle02On")) == 1);
-        CHECK(graded.node->undo_steps().empty());
+        CHECK(std::get<Colour>(graded.instance->value("handle02")) == (Colour{0.2, 0.7, 0.1}));
+        graded.change("handle02", Colour{1, 1, 0});
+        CHECK(std::get<int>(graded.instance->value("handle02On")) == 1);
+        CHECK(graded.instance->undo_steps().empty());
     }
 }
 
@@ -398,18 +368,17 @@ TEST(a_project_that_is_opened_keeps_colours_out_of_use) {
 
 TEST(keyframes_of_a_handle_out_of_use_are_kept) {
     Graded graded;
-    graded.node->animate("handle04", {{0, Colour{0, 0, 0}}, {9, Colour{1, 1, 1}}});
-    const int before = graded.node->settings("handle04");
+    graded.instance->animate("handle04", {{0, Colour{0, 0, 0}}, {9, Colour{1, 1, 1}}});
+    const int before = graded.instance->settings("handle04");
     write("clip.p4d.json", sidecar_text(false));
-    CHECK(graded.node->changed("strength") == kOfxStatOK);
-    CHECK(graded.node->settings("handle04") == before);
+    CHECK(graded.instance->changed("strength") == kOfxStatOK);
+    CHECK(graded.instance->settings("handle04") == before);
 }
 
 TEST(a_slot_may_name_any_handle) {
     Graded graded;
-    Instance& node = *graded.node;
-    node.set("handle30Id", std::string("v11"));
-    CHECK(node.changed("handle30Id") == kOfxStatOK);
+    Instance& node = *graded.instance;
+    graded.change("handle30Id", std::string("v11"));
     CHECK(node.properties("handle30").text(kOfxPropLabel) == "v11, frame 20");
     CHECK(!secret(node, "handle30"));
     graded.use("handle30", {0.4, 0.5, 0.6});

@@ -19,9 +19,7 @@ TEST(a_slots_id_is_the_weights_handle_and_a_missing_one_is_said) {
     CHECK(by_id.storage() == by_place.storage());
     for (const int slot : {18, 33, 100000, 0, -4}) {
         node.set("weightOf", slot);
-        Picture output(layout);
-        CHECK(node.instance->render(2, &source, output, layout.bounds) == kOfxStatOK);
-        CHECK(output.pixels(layout.bounds) == source.pixels(layout.bounds));
+        CHECK(node.render(source, 2) == source.pixels(layout.bounds));
         const std::string said = node.instance->effect().persistent_message;
         EXPECT(said.find("expected one of its 17") != std::string::npos, said);
     }

@@ -19,48 +19,33 @@ double linear_of(double encoded) {
     return encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
 }
 
-struct Window {
-    Plugin plugin{bundle()};
-    std::string path;
-    palette4d::Sidecar parsed;
-    std::unique_ptr<Instance> node;
-    Layout layout;
-    Picture source{layout};
+/// The sidecar, of which a window of Natron with a project hears next.
+std::string in_natron(const std::string& chosen, const std::string& project) {
+    Config config;
+    config.natron = true;
+    config.project = project;
+    Host::get().configure(config);
+    return chosen;
+}
 
+struct Window : Shown {
     explicit Window(const std::string& chosen = sidecar(), const std::string& project = "")
-        : path(chosen), parsed(palette4d::read_sidecar(path)) {
-        Config config;
-        config.natron = true;
-        config.project = project;
-        Host::get().configure(config);
-        node = plugin.create(kOfxImageEffectContextGeneral);
-        fill(source);
+        : Shown(in_natron(chosen, project), kOfxImageEffectContextGeneral) {
         change("sidecar", path);
     }
-    void change(const std::string& name, Value value) {
-        node->set(name, std::move(value));
-        CHECK(node->changed(name) == kOfxStatOK);
-    }
-    std::vector<unsigned char> render(double time = 4) {
-        Picture output(layout);
-        CHECK(node->render(time, &source, output, layout.bounds) == kOfxStatOK);
-        return output.pixels(layout.bounds);
-    }
-    std::vector<unsigned char> edited() const {
-        return recoloured(parsed, 14, source, layout.bounds);
-    }
-    std::vector<unsigned char> unchanged() const { return source.pixels(layout.bounds); }
+    std::vector<unsigned char> render(double time = 4) const { return Shown::render(time); }
+    std::vector<unsigned char> edited(double frame = 14) const { return Shown::edited(frame); }
     int in_use() {
         int count = 0;
-        for (const std::string& name : node->effect().params.order) {
+        for (const std::string& name : instance->effect().params.order) {
             if (name.rfind("handle", 0) == 0 && name.size() > 2 &&
                 name.compare(name.size() - 2, 2, "On") == 0) {
-                count += std::get<int>(node->value(name));
+                count += std::get<int>(instance->value(name));
             }
         }
         return count;
     }
-    Colour colour(const char* name) { return std::get<Colour>(node->value(name)); }
+    Colour colour(const char* name) { return std::get<Colour>(instance->value(name)); }
 };
 
 }  // namespace
@@ -70,13 +55,13 @@ TEST(a_window_does_not_hang) {
     Window window;
     for (const bool edited : {false, true}) {
         write("clip.p4d.json", sidecar_text(edited));
-        CHECK(window.node->changed("reload") == kOfxStatOK);
+        CHECK(window.instance->changed("reload") == kOfxStatOK);
     }
     write("clip.p4d.json", sidecar_text(false));
-    CHECK(window.node->changed("", "", kOfxChangeTime) == kOfxStatOK);
+    CHECK(window.instance->changed("", "", kOfxChangeTime) == kOfxStatOK);
     window.change("sidecar", sidecar("other.p4d.json"));
     window.change("handle02", Colour{1, 1, 0});
-    CHECK(window.node->changed("resetHandles") == kOfxStatOK);
+    CHECK(window.instance->changed("resetHandles") == kOfxStatOK);
     // The colours follow all the same.
     CHECK(window.colour("handle02") == (Colour{0.2, 0.7, 0.1}));
 }
@@ -85,7 +70,7 @@ TEST(a_message_is_its_text_whatever_is_in_it) {
     Window window;
     window.change("sidecar", std::string("/nowhere/100%s %d.p4d.json"));
     CHECK(window.render() == window.unchanged());
-    const std::string& said = window.node->effect().persistent_message;
+    const std::string& said = window.message();
     EXPECT(said.find("/nowhere/100%s %d.p4d.json: ") == 0, "said '" + said + "'");
 }
 
@@ -93,7 +78,7 @@ TEST(a_message_that_the_host_cleared_comes_back) {
     // The strict host clears it before each render.
     Window window;
     const std::string whole = sidecar_text();
-    const std::string& said = window.node->effect().persistent_message;
+    const std::string& said = window.message();
     for (int round = 0; round < 2; ++round) {
         write("clip.p4d.json", "no JSON");
         for (const double time : {4.0, 4.0, 5.0}) {
@@ -109,12 +94,12 @@ TEST(a_message_that_the_host_cleared_comes_back) {
 TEST(restored_defaults_leave_no_handle_on) {
     Window window;
     window.change("handle02", Colour{1, 1, 0});
-    window.node->animate("handle03", {{0, Colour{0, 0, 0}}, {9, Colour{1, 1, 1}}});
-    CHECK(window.node->changed("handle03") == kOfxStatOK);
+    window.instance->animate("handle03", {{0, Colour{0, 0, 0}}, {9, Colour{1, 1, 1}}});
+    CHECK(window.instance->changed("handle03") == kOfxStatOK);
     CHECK(window.in_use() == 2);
-    window.node->restore_defaults();
+    window.instance->restore_defaults();
     CHECK(window.in_use() == 0);
-    CHECK(window.node->text("sidecar").empty());
+    CHECK(window.instance->text("sidecar").empty());
     CHECK(window.render() == window.unchanged());
     window.change("sidecar", window.path);
     CHECK(window.in_use() == 0);
@@ -122,8 +107,8 @@ TEST(restored_defaults_leave_no_handle_on) {
     CHECK(window.colour("handle02") == (Colour{0.2, 0.7, 0.1}));
     // One parameter alone, of a slot in use and of one that is not.
     window.change("handle02", Colour{1, 1, 0});
-    window.node->restore_defaults({"handle02"});
-    window.node->restore_defaults({"handle05"});
+    window.instance->restore_defaults({"handle02"});
+    window.instance->restore_defaults({"handle05"});
     CHECK(window.in_use() == 0);
     CHECK(window.colour("handle02") == (Colour{0.2, 0.7, 0.1}));
     CHECK(window.render() == window.edited());
@@ -134,7 +119,7 @@ TEST(restored_defaults_leave_no_handle_on) {
 
 TEST(a_cache_keyed_by_the_parameters_is_never_stale) {
     Window window;
-    Instance& node = *window.node;
+    Instance& node = *window.instance;
     const std::string whole = sidecar_text(), plain = sidecar_text(false);
     const std::vector<unsigned char> edited = window.edited(), unchanged = window.unchanged();
     const auto told = [&] { CHECK(node.changed("", "", kOfxChangeTime) == kOfxStatOK); };
@@ -153,15 +138,13 @@ TEST(a_cache_keyed_by_the_parameters_is_never_stale) {
     shows(unchanged, "broken");
     write("clip.p4d.json", whole);
     shows(edited, "fixed");
-    CHECK(node.cached(5, window.source) ==
-          recoloured(window.parsed, 15, window.source, window.layout.bounds));
+    CHECK(node.cached(5, window.source) == window.edited(15));
     write("clip.p4d.json", plain);
     CHECK(node.cached(6, window.source) == unchanged);
     write("clip.p4d.json", whole);
     // Nothing that the node has seen has changed, but the cache is wrong: Reload discards it.
     CHECK(node.changed("reload") == kOfxStatOK);
-    CHECK(node.cached(6, window.source) ==
-          recoloured(window.parsed, 16, window.source, window.layout.bounds));
+    CHECK(node.cached(6, window.source) == window.edited(16));
 }
 
 TEST(paths_survive_a_project_that_is_saved) {
@@ -176,21 +159,21 @@ TEST(paths_survive_a_project_that_is_saved) {
           std::string("${P4D_SHOW}/clip.p4d.json"), std::string("%P4D_SHOW%/clip.p4d.json"),
           "file://" + path, "\"" + path + "\"", "'" + path + "'", std::string("near.p4d.json"),
           std::string("[Project]/near.p4d.json"), path}) {
-        window.node->set("sidecar", given);
+        window.instance->set("sidecar", given);
         EXPECT(window.render() == window.edited(), given);
     }
     fs::rename(fs::u8path(path), folder() / "moved.p4d.json");
-    window.node->set("sidecar", std::string("/elsewhere/moved.p4d.json"));
-    window.node->set("clipFolder", std::string());
+    window.instance->set("sidecar", std::string("/elsewhere/moved.p4d.json"));
+    window.instance->set("clipFolder", std::string());
     CHECK(window.render() == window.unchanged());
-    window.node->set("clipFolder", std::string("~"));
+    window.instance->set("clipFolder", std::string("~"));
     CHECK(window.render() == window.edited());
-    window.node->set("clipFolder", std::string("$P4D_SHOW"));
+    window.instance->set("clipFolder", std::string("$P4D_SHOW"));
     CHECK(window.render() == window.edited());
     // What is missing is named without the project's folder.
-    window.node->set("sidecar", std::string("$P4D_SHOW/gone.p4d.json"));
+    window.instance->set("sidecar", std::string("$P4D_SHOW/gone.p4d.json"));
     window.render();
-    const std::string& said = window.node->effect().persistent_message;
+    const std::string& said = window.message();
     EXPECT(said.find(in + "/gone.p4d.json: ") == 0, said);
 }
 
@@ -199,17 +182,17 @@ TEST(a_typed_colour_is_undone_in_one_step) {
     const Colour before = window.colour("handle02");
     window.change("handle02", Colour{1, 1, 0});
     CHECK(window.in_use() == 1);
-    CHECK(window.node->undo_steps().empty());
+    CHECK(window.instance->undo_steps().empty());
     window.change("handle02", before);  // the host's undo, of what the user typed alone
     CHECK(window.in_use() == 0);
-    CHECK(window.node->text("handle02Id").empty());
+    CHECK(window.instance->text("handle02Id").empty());
     CHECK(window.render() == window.edited());
     window.change("handle02", Colour{1, 1, 0});  // and its redo
     CHECK(window.in_use() == 1);
     // A slot that the user has switched on stays on with the palette's own colour.
     window.change("handle03On", 1);
     window.change("handle03", window.colour("handle03"));
-    CHECK(std::get<int>(window.node->value("handle03On")) == 1);
+    CHECK(std::get<int>(window.instance->value("handle03On")) == 1);
 }
 
 TEST(reset_removes_keyframes) {
@@ -220,19 +203,19 @@ TEST(reset_removes_keyframes) {
         Host::get().configure(config);
         CHECK(window.plugin.load() == kOfxStatOK);
         const std::map<double, Value> keys = {{0, Colour{0, 0, 0}}, {9, Colour{1, 1, 1}}};
-        window.node->animate("handle02", keys);
-        CHECK(window.node->changed("handle02") == kOfxStatOK);
+        window.instance->animate("handle02", keys);
+        CHECK(window.instance->changed("handle02") == kOfxStatOK);
         CHECK(window.in_use() == 1);
         CHECK(window.render() != window.edited());
-        CHECK(window.node->changed("resetHandles") == kOfxStatOK);
+        CHECK(window.instance->changed("resetHandles") == kOfxStatOK);
         CHECK(window.in_use() == 0);
-        CHECK(window.node->effect().params.params.at("handle02")->keys.empty());
+        CHECK(window.instance->effect().params.params.at("handle02")->keys.empty());
         CHECK(window.colour("handle02") == (Colour{0.2, 0.7, 0.1}));
         CHECK(window.render() == window.edited());
         if (natron) continue;
-        window.node->undo();
+        window.instance->undo();
         CHECK(window.in_use() == 1);
-        CHECK(window.node->effect().params.params.at("handle02")->keys == keys);
+        CHECK(window.instance->effect().params.params.at("handle02")->keys == keys);
     }
 }
 
@@ -240,7 +223,7 @@ TEST(a_display_palette_on_a_linear_graph) {
     std::string text = sidecar_text();
     text.replace(text.find("\"encoding\": \"linear\""), 20, "\"encoding\": \"sRGB\"");
     Window window(write("srgb.p4d.json", text));
-    Instance& node = *window.node;
+    Instance& node = *window.instance;
     CHECK(node.text("status").find("expects the picture in sRGB\n") != std::string::npos);
     window.change("pictureIn", 2);
     CHECK(node.text("status").find("the picture in scene-linear light; the palette is in sRGB") !=
@@ -292,7 +275,7 @@ TEST(a_display_palette_on_a_linear_graph) {
 TEST(a_switch_and_its_colour_share_a_row) {
     Window window;
     for (const char* name : {"handle01On", "handle32On"}) {
-        CHECK(window.node->properties(name).number("OfxParamPropLayoutHint") == 2);
+        CHECK(window.instance->properties(name).number("OfxParamPropLayoutHint") == 2);
     }
-    CHECK(window.node->properties("handle01").number("OfxParamPropLayoutHint") == 0);
+    CHECK(window.instance->properties("handle01").number("OfxParamPropLayoutHint") == 0);
 }

@@ -107,15 +107,12 @@ TEST(every_output_is_the_cores_in_every_layout) {
 }
 
 TEST(a_lut_gets_no_palette_at_its_foot) {
-    Ready node;
-    const Layout layout;
-    Picture source(layout), output(layout);
-    fill(source);
+    Shown node;
     node.set("output", 2);
+    CHECK(node.render(5) != node.edited(15));
     // A host that wants colours alone.
     node.instance->extra_arguments["OfxImageEffectPropNoSpatialAwareness"] = std::string("true");
-    CHECK(node.instance->render(5, &source, output, layout.bounds) == kOfxStatOK);
-    CHECK(output.pixels(layout.bounds) == recoloured(node.parsed, 15, source, layout.bounds));
+    CHECK(node.render(5) == node.edited(15));
 }
 
 TEST(the_palette_of_an_unedited_sidecar_is_shown_too) {
@@ -134,8 +131,7 @@ TEST(the_palette_of_an_unedited_sidecar_is_shown_too) {
     CHECK(output.pixels(rect(0, 0, 64, 6)) != source.pixels(rect(0, 0, 64, 6)));
     // For a LUT there is nothing to do.
     node.instance->extra_arguments["OfxImageEffectPropNoSpatialAwareness"] = std::string("true");
-    CHECK(node.instance->render(3, &source, output, layout.bounds) == kOfxStatOK);
-    CHECK(output.pixels(layout.bounds) == source.pixels(layout.bounds));
+    CHECK(node.render(source, 3) == source.pixels(layout.bounds));
 }
 
 TEST(lightness_is_that_of_the_pictures_own_space) {
@@ -184,35 +180,27 @@ TEST(an_alpha_clip_passes) {
 }
 
 TEST(settings_out_of_their_ranges_are_brought_in) {
-    Ready node;
-    const Layout layout;
-    Picture source(layout);
-    fill(source);
+    Shown node;
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    const auto render = [&] {
-        Picture output(layout);
-        CHECK(node.instance->render(4, &source, output, layout.bounds) == kOfxStatOK);
-        return output.pixels(layout.bounds);
-    };
-    const auto plain = render();
+    const auto plain = node.render();
     for (const char* name : {"strength", "mix"}) {
         for (const double value : {7.0, nan}) {
             node.set(name, value);
-            CHECK(render() == plain);
+            CHECK(node.render() == plain);
         }
         node.set(name, -3.0);
-        CHECK(render() == source.pixels(layout.bounds));
+        CHECK(node.render() == node.unchanged());
         node.set(name, 1.0);
     }
     for (const double value : {-1.0, nan}) {
         node.set("keepLightness", value);
-        CHECK(render() == plain);
+        CHECK(node.render() == plain);
     }
     node.set("keepLightness", 0.0);
     for (const int value : {-1, 99}) {
         node.set("output", value);
         node.set("lightnessOf", value);
         node.set("matteIn", value);
-        CHECK(render() == plain);
+        CHECK(node.render() == plain);
     }
 }

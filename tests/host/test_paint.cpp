@@ -9,13 +9,6 @@ using namespace test;
 
 namespace {
 
-struct Painted : Ready {
-    Painted() {
-        instance = plugin.create(kOfxImageEffectContextPaint);
-        set("sidecar", path);
-    }
-};
-
 Layout brush_layout(Depth depth, const OfxRectI& bounds) {
     Layout layout;
     layout.channels = 1;
@@ -28,7 +21,7 @@ Layout brush_layout(Depth depth, const OfxRectI& bounds) {
 }  // namespace
 
 TEST(the_grade_shows_where_the_brush_is) {
-    Painted node;
+    Shown node(sidecar(), kOfxImageEffectContextPaint);
     for (const Layout& layout : layouts()) {
         const OfxRectI& b = layout.bounds;
         const Picture source = source_of(layout);
@@ -72,17 +65,11 @@ TEST(the_grade_shows_where_the_brush_is) {
 }
 
 TEST(without_a_brush_nothing_is_painted) {
-    Painted node;
-    const Layout layout;
-    Picture source(layout), output(layout);
-    fill(source);
-    CHECK(node.instance->render(3, &source, output, layout.bounds) == kOfxStatOK);
-    CHECK(output.pixels(layout.bounds) == source.pixels(layout.bounds));
+    Shown node(sidecar(), kOfxImageEffectContextPaint);
+    CHECK(node.render(3) == node.unchanged());
     // In any other context a brush is nothing.
-    const auto filter = node.plugin.create();
-    filter->set("sidecar", node.path);
-    Picture brush(brush_layout(Depth::kFloat, layout.bounds), 0);
-    filter->brush = &brush;
-    CHECK(filter->render(3, &source, output, layout.bounds) == kOfxStatOK);
-    CHECK(output.pixels(layout.bounds) == recoloured(node.parsed, 13, source, layout.bounds));
+    Shown filter;
+    Picture brush(brush_layout(Depth::kFloat, filter.layout.bounds), 0);
+    filter.instance->brush = &brush;
+    CHECK(filter.render(3) == filter.edited(13));
 }

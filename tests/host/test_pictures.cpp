@@ -50,16 +50,12 @@ TEST(every_layout_gives_the_cores_bytes) {
 }
 
 TEST(every_layout_in_the_general_context) {
-    Ready node;
-    node.instance = node.plugin.create(kOfxImageEffectContextGeneral);
-    node.set("sidecar", node.path);
+    Ready node(sidecar(), kOfxImageEffectContextGeneral);
     for (const Layout& layout : layouts()) {
         const Picture source = source_of(layout);
-        Picture output(layout);
-        const OfxRectI& b = layout.bounds;
-        CHECK(node.instance->render(4, &source, output, b) == kOfxStatOK);
-        CHECK(output.pixels(b) == recoloured(node.parsed, 14, source, b));
-        CHECK(output.pixels(b) != source.pixels(b));
+        const auto found = node.render(source, 4);
+        CHECK(found == recoloured(node.parsed, 14, source, layout.bounds));
+        CHECK(found != source.pixels(layout.bounds));
     }
 }
 
@@ -122,8 +118,8 @@ TEST(a_window_beyond_the_output_is_cut) {
 }
 
 TEST(times_offsets_and_strengths) {
-    Ready node;
-    const Layout layout;
+    Shown node;
+    const Layout& layout = node.layout;
     // Before, inside, between frames, and after the clip, which holds its ends.
     for (const double time : {-5.0, 0.0, 0.5, 3.999, 5.0, 7.0 + 1.0 / 3.0, 10.0, 11.0, 1e9}) {
         compare(*node.instance, node.parsed, layout, layout, layout.bounds, time);
@@ -143,20 +139,15 @@ TEST(times_offsets_and_strengths) {
     node.instance->animate("strength", {});
     node.instance->set("strength", 1.0);
 
-    Picture source(layout), output(layout);
-    fill(source);
     for (const double offset : {-2.0, 0.5, 6.0, 1e5}) {
-        node.instance->set("frameOffset", offset);
-        CHECK(node.instance->render(2, &source, output, layout.bounds) == kOfxStatOK);
-        CHECK(output.pixels(layout.bounds) ==
-              recoloured(node.parsed, 10 + 2 + offset, source, layout.bounds));
+        node.set("frameOffset", offset);
+        CHECK(node.render(2) == node.edited(10 + 2 + offset));
     }
-    CHECK(node.instance->effect().persistent_message.empty());
+    CHECK(node.message().empty());
     // No number at all: the picture passes through, with a word.
-    node.instance->set("frameOffset", std::numeric_limits<double>::quiet_NaN());
-    CHECK(node.instance->render(2, &source, output, layout.bounds) == kOfxStatOK);
-    CHECK(output.pixels(layout.bounds) == source.pixels(layout.bounds));
-    CHECK(!node.instance->effect().persistent_message.empty());
+    node.set("frameOffset", std::numeric_limits<double>::quiet_NaN());
+    CHECK(node.render(2) == node.unchanged());
+    CHECK(!node.message().empty());
 }
 
 TEST(drafts_and_playback_show_what_a_final_render_writes) {
@@ -164,32 +155,21 @@ TEST(drafts_and_playback_show_what_a_final_render_writes) {
     Layout layout;
     layout.bounds = rect(0, 0, 1920, 8);
     layout.definition = rect(0, 0, 1920, 1080);
-    Picture source(layout), output(layout);
+    Picture source(layout);
     fill(source);
     const auto expected = recoloured(node.parsed, 12, source, layout.bounds);
     for (const char* said :
          {kOfxImageEffectPropInteractiveRenderStatus, kOfxImageEffectPropRenderQualityDraft}) {
         node.instance->extra_arguments = {{said, 1}};
-        CHECK(node.instance->render(2, &source, output, layout.bounds) == kOfxStatOK);
-        CHECK(output.pixels(layout.bounds) == expected);
+        CHECK(node.render(source, 2) == expected);
     }
 }
 
 TEST(an_unedited_palette_returns_every_bit) {
-    Plugin plugin(bundle());
-    const auto instance = plugin.create();
-    instance->set("sidecar", sidecar("plain.p4d.json", false));
-    for (const Depth depth : kDepths) {
-        for (const char* premultiplication : {kOfxImagePreMultiplied, kOfxImageUnPreMultiplied}) {
-            Layout layout;
-            layout.bounds = rect(0, 0, 64, 64);
-            layout.depth = depth;
-            layout.premultiplication = premultiplication;
-            Picture source(layout), output(layout);
-            fill(source);
-            CHECK(instance->render(3, &source, output, layout.bounds) == kOfxStatOK);
-            CHECK(output.pixels(layout.bounds) == source.pixels(layout.bounds));
-        }
+    Ready node(sidecar("plain.p4d.json", false));
+    for (const Layout& layout : layouts()) {
+        const Picture source = source_of(layout);
+        CHECK(node.render(source, 3) == source.pixels(layout.bounds));
     }
 }
 
@@ -207,8 +187,7 @@ TEST(an_edit_that_moves_nothing_here_returns_every_byte) {
         }
     }
     node.instance->set("strength", 1e-9);
-    CHECK(node.instance->render(3, &source, output, layout.bounds) == kOfxStatOK);
-    CHECK(output.pixels(layout.bounds) == source.pixels(layout.bounds));
+    CHECK(node.render(source, 3) == source.pixels(layout.bounds));
 }
 
 TEST(a_source_smaller_than_the_window_is_framed_in_black) {
@@ -290,11 +269,10 @@ TEST(images_that_are_parts_are_parts_of_the_one_picture) {
 }
 
 TEST(no_source_is_transparent_black) {
-    Ready node;
-    Layout layout;
-    Picture output(layout);
-    CHECK(node.instance->render(1, nullptr, output, layout.bounds) == kOfxStatOK);
-    CHECK(output.pixels(layout.bounds) == Picture(layout, 0).pixels(layout.bounds));
+    Shown node;
+    Picture output(node.layout);
+    CHECK(node.instance->render(1, nullptr, output, node.layout.bounds) == kOfxStatOK);
+    CHECK(output.pixels(node.layout.bounds) == Picture(node.layout, 0).pixels(node.layout.bounds));
 }
 
 TEST(unequal_layouts_are_refused_in_black) {

@@ -21,13 +21,7 @@ std::string text_of(const std::string& source, bool edited = true) {
     return text.replace(text.find(own), own.size(), source);
 }
 
-struct Page {
-    Plugin plugin{bundle()};
-    palette4d::Sidecar parsed = palette4d::parse_sidecar(sidecar_text(), "");
-    Layout layout;
-    Picture source{layout};
-    Page() { fill(source); }
-
+struct Page : Shown {
     std::unique_ptr<Instance> clip(const std::string& media) {
         auto node = plugin.create();
         node->effect().properties.put(kFile, media);
@@ -35,15 +29,12 @@ struct Page {
     }
     std::vector<unsigned char> render(Instance& node, double time, Value frame) {
         node.extra_arguments = {{kFrame, frame}};
-        Picture output(layout);
-        CHECK(node.render(time, &source, output, layout.bounds) == kOfxStatOK);
-        return output.pixels(layout.bounds);
+        return Shown::render(node, time);
     }
     std::vector<unsigned char> at(double frame, bool edited = true) const {
         palette4d::Sidecar other = palette4d::parse_sidecar(sidecar_text(edited), "");
         return recoloured(other, frame, source, layout.bounds);
     }
-    std::vector<unsigned char> unchanged() const { return source.pixels(layout.bounds); }
 };
 
 }  // namespace

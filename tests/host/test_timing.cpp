@@ -41,32 +41,21 @@ TimeSettings manual() {
     return settings;
 }
 
-struct Timed {
-    Plugin plugin{bundle()};
-    palette4d::Sidecar parsed = palette4d::parse_sidecar(sidecar_text(), "");
-    std::unique_ptr<Instance> node = plugin.create();
-    Layout layout;
-    Picture source{layout};
-    Timed() {
-        fill(source);
-        node->set("sidecar", sidecar());
-    }
+struct Timed : Shown {
     /// The host renders at a time: the picture is the core's at a frame.
     void expect(double time, double frame) {
-        Picture output(layout);
-        CHECK(node->render(time, &source, output, layout.bounds) == kOfxStatOK);
-        EXPECT(output.pixels(layout.bounds) == recoloured(parsed, frame, source, layout.bounds),
+        EXPECT(render(time) == edited(frame),
                "time " + std::to_string(time) + " is not frame " + std::to_string(frame));
     }
     void expect_source(double time) {
-        Picture output(layout);
-        CHECK(node->render(time, &source, output, layout.bounds) == kOfxStatOK);
-        CHECK(output.pixels(layout.bounds) == source.pixels(layout.bounds));
+        CHECK(render(time) == unchanged());
         std::string name;
         double at = 0;
-        CHECK(node->is_identity(time, name, at) == kOfxStatOK);
+        CHECK(instance->is_identity(time, name, at) == kOfxStatOK);
     }
-    OfxPropertySetStruct& source_clip() { return node->effect().clips.at("Source")->properties; }
+    OfxPropertySetStruct& source_clip() {
+        return instance->effect().clips.at("Source")->properties;
+    }
 };
 
 }  // namespace
@@ -214,7 +203,7 @@ TEST(before_and_after_the_clip) {
 
 TEST(the_nodes_parameters_of_time) {
     Timed timed;
-    Instance& node = *timed.node;
+    Instance& node = *timed.instance;
     timed.expect(2.5, 12.5);
     node.set("timing", 1);
     node.set("firstFrame", 100.0);
@@ -258,13 +247,13 @@ TEST(the_host_reports_its_clip) {
     timed.source_clip().put(kOfxImageEffectPropFrameRate, 48.0);
     timed.expect(304, 12);
     // The project's own rate comes first.
-    timed.node->effect().properties.put(kOfxImageEffectPropFrameRate, 24.0);
+    timed.instance->effect().properties.put(kOfxImageEffectPropFrameRate, 24.0);
     timed.expect(304, 14);
 }
 
 TEST(the_status_says_which_frame_is_shown) {
     Timed timed;
-    Instance& node = *timed.node;
+    Instance& node = *timed.instance;
     const auto says = [&](const std::string& end) {
         const std::string text = node.text("status");
         EXPECT(text.size() >= end.size() && text.substr(text.size() - end.size()) == end, text);
@@ -287,10 +276,8 @@ TEST(times_that_are_no_numbers_pass_with_a_message) {
     const double infinity = std::numeric_limits<double>::infinity();
     for (const char* name : {"inPoint", "frameOffset", "speed"}) {
         Timed timed;
-        timed.node->set(name, infinity);
-        Picture output(timed.layout);
-        CHECK(timed.node->render(3, &timed.source, output, timed.layout.bounds) == kOfxStatOK);
-        CHECK(output.pixels(timed.layout.bounds) == timed.source.pixels(timed.layout.bounds));
-        CHECK(!timed.node->effect().persistent_message.empty());
+        timed.set(name, infinity);
+        CHECK(timed.render(3) == timed.unchanged());
+        CHECK(!timed.message().empty());
     }
 }

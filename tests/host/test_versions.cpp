@@ -27,24 +27,11 @@ std::string text_with(const std::string& picks, const std::string& versions) {
 const std::string kVersions = R"({"name": "warm 'Gr\u00fcn", "edits": {"vertices": [],
     "stops": [], )" + kPicks + R"(}}, {"name": "plain", "edits": {"vertices": [], "stops": []}})";
 
-struct Scene : Ready {
-    Layout layout;
-    Picture source{layout}, output{layout};
-    explicit Scene(const std::string& text) : Ready(test::write("clip.p4d.json", text)) {
-        fill(source);
-    }
-    std::vector<unsigned char> render(double time = 2) {
-        output = Picture(layout);
-        CHECK(instance->render(time, &source, output, layout.bounds) == kOfxStatOK);
-        return output.pixels(layout.bounds);
-    }
-    std::vector<unsigned char> unchanged() const { return source.pixels(layout.bounds); }
+struct Scene : Shown {
+    explicit Scene(const std::string& text) : Shown(test::write("clip.p4d.json", text)) {}
     std::vector<unsigned char> expected(const palette4d::Edits& edits, double frame = 12) const {
-        palette4d::Sidecar sidecar = parsed;
-        sidecar.edits = edits;
-        return recoloured(sidecar, frame, source, layout.bounds);
+        return edited(edits, frame);
     }
-    std::string message() { return instance->effect().persistent_message; }
 };
 
 }  // namespace
@@ -85,7 +72,7 @@ TEST(the_node_applies_the_picks) {
         CHECK(found != scene.expected(without, 10 + time));
     }
     CHECK(scene.instance->changed("reload") == kOfxStatOK);
-    CHECK(scene.instance->text("status").find("3 edits, 2 picks and holds\n") != std::string::npos);
+    CHECK(scene.says("3 edits, 2 picks and holds\n"));
     // Rewritten with another pick.
     std::string other = kPicks;
     other.replace(other.find("0.25, 0.5, 0.75"), 15, "0.25, 0.5, 0.50");
@@ -137,12 +124,11 @@ TEST(the_user_chooses_a_version) {
     CHECK(scene.message().empty());
     // The status counts the version's edits and names the version.
     CHECK(scene.instance->changed("version") == kOfxStatOK);
-    CHECK(scene.instance->text("status").find("0 edits") != std::string::npos);
-    CHECK(scene.instance->text("status").find(" in version 'plain'\n") != std::string::npos);
-    scene.set("version", std::string());
+    CHECK(scene.says("0 edits"));
+    CHECK(scene.says(" in version 'plain'\n"));
+    scene.change("version", std::string());
     CHECK(scene.render() == active);
-    CHECK(scene.instance->changed("version") == kOfxStatOK);
-    CHECK(scene.instance->text("status").find("in version") == std::string::npos);
+    CHECK(!scene.says("in version"));
     CHECK(scene.instance->text("status").find("\nversions 'warm 'Gr\u00fcn', 'plain'\n") !=
           std::string::npos);
 }
