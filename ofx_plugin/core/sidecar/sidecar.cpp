@@ -29,7 +29,9 @@ void check_members(const Cursor& root) {
 
 /// "extra" is free-form: what is not as palette4d writes it is passed over.
 std::optional<PlayInEdit> play_in(const Json& root) {
-    const Json edit = root.value(Json::json_pointer("/extra/edit"), Json());
+    const Json::json_pointer place("/extra/edit");
+    if (!root.contains(place)) return std::nullopt;
+    const Json& edit = root.at(place);
     if (!edit.is_object()) return std::nullopt;
     const Json speed = edit.value("speed", Json()), at = edit.value("inPoint", Json());
     const Json reverse = edit.value("reverse", Json());
