@@ -26,37 +26,6 @@ def same(a: _core.ColourTree, b: _core.ColourTree) -> bool:
     return np.array_equal(a.rgb, b.rgb) and np.array_equal(a.counts, b.counts)
 
 
-def test_8_bit_colours_stay_exact():
-    levels = np.random.default_rng(1).integers(0, 256, (40, 50, 3))
-    found = gather(3, (levels / 255).astype(np.float32), AnalysisOptions(coarse_colours=500))
-    expected, times = np.unique(levels.reshape(-1, 3), axis=0, return_counts=True)
-    order = np.lexsort(np.round(found.colours.rgb * 255).T[::-1])
-    np.testing.assert_allclose(found.colours.rgb[order], expected / 255, atol=1e-7)
-    np.testing.assert_array_equal(found.colours.counts[order], times)
-    np.testing.assert_allclose(found.low, levels.min(axis=(0, 1)) / 255, atol=1e-7)
-    np.testing.assert_allclose(found.high, levels.max(axis=(0, 1)) / 255, atol=1e-7)
-    assert len(found.coarse) <= 500
-    assert found.coarse.total == found.colours.total == found.pixels == 2000
-
-
-def test_colours_are_bounded():
-    found = gather(0, noise(2, size=(200, 200)), AnalysisOptions(colours=1000, coarse_colours=100))
-    assert 800 < len(found.colours) <= 1000
-    assert 80 < len(found.coarse) <= 100
-    assert found.colours.total == found.coarse.total == found.pixels == 40000
-
-
-def test_what_is_no_colour_does_not_count():
-    image = np.concatenate([noise(3), np.ones((20, 30, 1), np.float32)], axis=2)
-    image[0, :, 3] = 0  # transparent
-    image[1, :, 0] = np.nan
-    image[2, :, 1] = np.inf
-    found = gather(7, image, AnalysisOptions())
-    assert found.frame == 7
-    assert (found.pixels, found.ignored) == (17 * 30, 90)
-    assert gather(7, np.full((4, 4, 3), np.nan, np.float32), AnalysisOptions()) is None
-
-
 def test_gamut_grows_only_for_colours_outside():
     inside = gather(0, noise(5), AnalysisOptions())
     outside = gather(1, noise(6, 3, -1), AnalysisOptions())

@@ -30,6 +30,19 @@ def flat(seed):
     return image
 
 
+FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
+
+
+def drifting(count):
+    """Four colours, one of which goes from red to yellow and back."""
+    images = []
+    for i in range(count):
+        rgb = FOUR.copy()
+        rgb[1, 1] += 0.6 * (1 - abs(2 * i / (count - 1) - 1))
+        images.append(mixture(rgb, i))
+    return images
+
+
 NOTHING = noise(0) * np.float32(np.nan)
 
 # name: frames, colours of the first frame's palette (None: any)
@@ -91,7 +104,7 @@ def test_frame_numbers_and_steps_are_kept():
 
 
 def test_the_same_clip_gives_the_same_text():
-    frames = [noise(i, 0.5 + 0.1 * i) for i in range(5)]
+    frames = drifting(6)
     texts = {
         sidecar.dumps(pipeline.analyze(ArrayClip(frames), AnalysisOptions(threads=n)).document)
         for n in (1, 3)
@@ -132,26 +145,13 @@ def test_an_array_is_a_clip():
     assert found.document == same.document
 
 
-FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
-
-
 def test_how_frames_are_numbered_does_not_matter():
-    frames = stats([noise(i) for i in range(6)])
+    frames = stats(drifting(6))
     later = [dataclasses.replace(one, frame=one.frame + 1001) for one in frames]
     a, b = (pipeline.find_polytope(f, AnalysisOptions(vertices=12)) for f in (frames, later))
     np.testing.assert_array_equal(a.polytope.vertices[:, :3], b.polytope.vertices[:, :3])
     np.testing.assert_allclose(a.polytope.vertices[:, 3] + 1001, b.polytope.vertices[:, 3])
     assert a.polytope.blocks[-1].last + 1001 == b.polytope.blocks[-1].last
-
-
-def drifting(count):
-    """Four colours, one of which goes from red to yellow and back."""
-    images = []
-    for i in range(count):
-        rgb = FOUR.copy()
-        rgb[1, 1] += 0.6 * (1 - abs(2 * i / (count - 1) - 1))
-        images.append(mixture(rgb, i))
-    return images
 
 
 MOVING = {

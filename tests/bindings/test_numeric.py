@@ -220,14 +220,6 @@ def test_empty_images_stay_empty(recolourer: _core.Recolourer, shape: tuple[int,
     assert recolourer.apply(np.zeros(shape, np.float32)).shape == shape
 
 
-def test_the_number_of_threads_does_not_show(recolourer: _core.Recolourer) -> None:
-    image = np.random.default_rng(3).uniform(-0.2, 1.2, (61, 40, 4)).astype(np.float32)
-    expected = recolourer.apply(image, strength=0.7, premultiplied=True)
-    for threads in (0, 2, 5, 1000):
-        result = recolourer.apply(image, strength=0.7, premultiplied=True, threads=threads)
-        assert same_bits(result, expected).all()
-
-
 def unaligned(shape: tuple[int, ...]) -> Image:
     size = int(np.prod(shape)) * 4
     return np.zeros(size + 1, np.uint8)[1:].view(np.float32).reshape(shape)

@@ -74,17 +74,6 @@ def test_picks_at_a_frame() -> None:
             bad(float("nan"))
 
 
-def test_the_matte_of_one_pick() -> None:
-    read = sidecar(pick("a", RED, (0.2, 0.3, 0.6)), hold("h", (0.3, 0.6, 0.3)))
-    for name, colour in (("a", RED), ("h", (0.3, 0.6, 0.3))):
-        shown = _core.Recolourer(RGB, RGB, FACES, picks=read.pick_matte_at(name, 7))
-        image = np.array([[colour, (0.2, 0.25, 0.7)]], np.float32)
-        moved = shown.apply(image) - image
-        np.testing.assert_allclose(moved, [[[1, 1, 1], [0, 0, 0]]], atol=1e-6)
-    assert not read.pick_matte_at("nobody", 7).picks
-    assert _core.Recolourer(RGB, RGB, FACES, picks=read.pick_matte_at("nobody", 7)).identity
-
-
 def test_frame_picks_keep_what_they_are_given() -> None:
     matte, left = np.random.default_rng(2).uniform(size=(2, *GRID)).astype(np.float32)
     given = [(RED, (0.1, -0.2, 0.0), 0.5, matte), ((0.1, 0.2, 0.3), (0.0, 0.0, 0.1), 1.0, left)]

@@ -178,10 +178,6 @@ class TestWrongUsage:
         assert "expected a whole number from 2 to 129" in text
         assert not list(tmp_path.iterdir())
 
-    def test_the_smallest_size(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-        assert run("-o", tmp_path / "a.cube", "--size", "2") == 0
-        assert "2 samples a side" in capsys.readouterr().out
-
     @pytest.mark.parametrize(
         ("words", "said"),
         [

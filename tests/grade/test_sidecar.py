@@ -151,32 +151,6 @@ class Interrupted(KeyboardInterrupt):
 FULL = OSError(28, "No space left on device")
 
 
-@pytest.mark.parametrize(
-    ("step", "problem"),
-    [
-        ("fsync", FULL),
-        ("fsync", Interrupted()),
-        ("fchmod", Interrupted()),
-        ("replace", FULL),
-        ("replace", Interrupted()),
-    ],
-)
-def test_failure_at_any_step_leaves_the_old_file(
-    edited: Path, monkeypatch: pytest.MonkeyPatch, step: str, problem: BaseException
-) -> None:
-    def fail(*_args: Any, **_keywords: Any) -> None:
-        raise problem
-
-    before = edited.read_bytes()
-    owner = Path if step == "replace" else os
-    monkeypatch.setattr(owner, step, fail)
-    expected = Interrupted if isinstance(problem, Interrupted) else Palette4dError
-    with pytest.raises(expected):
-        sidecar.save(golden("split"), edited, on_edits="drop")
-    assert edited.read_bytes() == before
-    assert names(edited.parent) == [edited.name]
-
-
 def test_edits_are_not_lost_unasked(edited: Path) -> None:
     before = edited.read_bytes()
     for attempt in (

@@ -17,7 +17,7 @@ from palette4d.lut_export import lut3d
 from palette4d.lut_export.bake import bake
 from palette4d.lut_export.bake_error import load, stated
 
-from palette4d import Palette4dError, SidecarError, _core
+from palette4d import Palette4dError, _core
 from palette4d.cli.main import main
 from palette4d.grade.document import Document
 
@@ -97,15 +97,6 @@ def test_grid_error_is_what_it_says(warm_sidecar: Path, tmp_path: Path) -> None:
     assert result.clip_frame is None
 
 
-def test_error_shrinks_with_size(warm_sidecar: Path, tmp_path: Path) -> None:
-    means = [
-        bake(warm_sidecar, 0.0, tmp_path / f"{size}.clf", size=size).grid.worst.mean
-        for size in (5, 9, 17, 33)
-    ]
-    assert means == sorted(means, reverse=True)
-    assert means[-1] < means[0] / 10
-
-
 @pytest.mark.parametrize(("extension", "tolerance"), [(".cube", 6e-7), (".clf", 1.5e-7)])
 def test_no_edit_is_the_identity(
     extension: str, tolerance: float, write_sidecar: Callable[..., Path], tmp_path: Path
@@ -129,26 +120,6 @@ def test_strength_zero_is_the_identity_and_half_is_half(warm_sidecar: Path, tmp_
     np.testing.assert_allclose(got[0, 0], [1.0, 0.9, 0.775], atol=1e-6)
 
 
-@pytest.mark.parametrize("extension", [".cube", ".clf"])
-@pytest.mark.parametrize("channel", [0, 1, 2])
-def test_axes_are_not_transposed(
-    channel: int, extension: str, write_sidecar: Callable[..., Path], tmp_path: Path
-) -> None:
-    """Only one channel changes, and only by its own value: halved."""
-
-    def halved(colour: tuple[float, float, float]) -> tuple[float, float, float]:
-        values = list(colour)
-        values[channel] *= 0.5
-        return values[0], values[1], values[2]
-
-    out = tmp_path / f"axis{extension}"
-    bake(write_sidecar(halved), 0.0, out, size=17)
-    colours = random_colours()
-    want = colours.copy()
-    want[..., channel] *= 0.5
-    assert np.abs(read_back(out, colours, ocio.INTERP_DEFAULT) - want).max() < 2e-6
-
-
 def test_a_cube_file_lists_red_fastest(write_sidecar: Callable[..., Path], tmp_path: Path) -> None:
     out = tmp_path / "order.cube"
     bake(write_sidecar(lambda c: (c[0] * 0.5, c[1], c[2])), 0.0, out, size=3)
@@ -159,16 +130,6 @@ def test_a_cube_file_lists_red_fastest(write_sidecar: Callable[..., Path], tmp_p
     assert [float(v) for v in numbers[1].split()] == [0.25, 0.0, 0.0]
     assert [float(v) for v in numbers[3].split()] == [0.0, 0.5, 0.0]
     assert [float(v) for v in numbers[9].split()] == [0.0, 0.0, 0.5]
-
-
-def test_cube_and_clf_agree(warm_sidecar: Path, tmp_path: Path) -> None:
-    colours = random_colours()
-    for name in ("a.cube", "a.clf"):
-        bake(warm_sidecar, 2.0, tmp_path / name, size=33)
-    cube = read_back(tmp_path / "a.cube", colours, ocio.INTERP_TETRAHEDRAL)
-    clf = read_back(tmp_path / "a.clf", colours, ocio.INTERP_DEFAULT)
-    assert np.abs(cube - clf).max() < 2e-6  # six decimals in the .cube
-    assert np.abs(clf - colours).max() > 0.2
 
 
 def test_nodes_hold_the_exact_colours(warm_sidecar: Path, tmp_path: Path) -> None:
@@ -339,13 +300,6 @@ def test_a_file_that_is_no_lut(tmp_path: Path) -> None:
         load(path, ["linear"])
 
 
-def test_a_broken_sidecar_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "broken.p4d.json"
-    path.write_text("{", encoding="utf-8")
-    with pytest.raises(SidecarError, match=r"broken\.p4d\.json"):
-        bake(path, 0.0, tmp_path / "a.cube")
-
-
 class TestCommand:
     def write_frames(self, folder: Path, frames: range) -> F32:
         import OpenImageIO as oiio
@@ -406,17 +360,3 @@ class TestCommand:
         assert main([*arguments, "--clip", str(tmp_path / "no.####.png")]) == 1
         assert "palette4d: error:" in capsys.readouterr().err
         assert not out.exists()
-
-    def test_outside_the_clip(
-        self, warm_sidecar: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-    ) -> None:
-        out = tmp_path / "a.cube"
-        assert main(["bake", str(warm_sidecar), "--frame", "11", "-o", str(out)]) == 1
-        assert "from 0 to 10" in capsys.readouterr().err
-        assert not out.exists()
-
-    @pytest.mark.parametrize("frame", ["nan", "inf", "x"])
-    def test_no_frame_number(self, frame: str, warm_sidecar: Path, tmp_path: Path) -> None:
-        with pytest.raises(SystemExit) as stop:
-            main(["bake", str(warm_sidecar), f"--frame={frame}", "-o", str(tmp_path / "a.cube")])
-        assert stop.value.code == 2

@@ -15,7 +15,8 @@ from palette4d.grade import sidecar
 from palette4d.grade.document import Document
 from palette4d.shows.analysis import analyze_shots
 
-FEW = {"colours": 256, "allow_cuts": True}
+#: A palette that does not change: these tests are about times, not about the search.
+FEW = {"method": "static", "colours": 512, "coarse_colours": 128, "allow_cuts": True}
 
 
 @pytest.fixture

@@ -31,6 +31,8 @@ LENGTH, FRAMES = 3, 205
 def movie(folder: Path, rate: Fraction, timecode: str = "") -> Path:
     """A movie of 205 frames of 16 x 16 pixels."""
     path = folder / f"{float(rate):.3f}{timecode.replace(':', '_').replace(';', 'd')}.mov"
+    if path.exists():
+        return path
     picture = np.zeros((16, 16, 3), np.uint8)
 
     def prepare(stream) -> None:
