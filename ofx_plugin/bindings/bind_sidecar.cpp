@@ -160,9 +160,9 @@ std::vector<double> pick_times_of(const NamedEdits& self) {
         if (!pick.enabled) continue;
         times.push_back(pick.frame);
         for (const palette4d::PathKey& key : pick.path) times.push_back(key.frame);
-        const double ramp = std::max(pick.fade, self.frame_step);
-        if (pick.from) times.insert(times.end(), {*pick.from - ramp, *pick.from});
-        if (pick.until) times.insert(times.end(), {*pick.until, *pick.until + ramp});
+        const double in = pick.ramp_in(self.frame_step), out = pick.ramp_out(self.frame_step);
+        if (pick.from) times.insert(times.end(), {*pick.from - in, *pick.from});
+        if (pick.until) times.insert(times.end(), {*pick.until, *pick.until + out});
     }
     return times;
 }

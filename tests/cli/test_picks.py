@@ -337,6 +337,8 @@ def test_history_says_what_changed(path: str, run: Run) -> None:
         ("--reach", "1.5"),
         ("--to", "#112233"),
         ("--from", "1", "--until", "3", "--fade", "2"),
+        ("--fade-out", "0.5"),
+        ("--fade-out", "2"),
         ("--toward", "colour", "--whole-hue"),
     ):
         assert run("change", "p1", *words)[0] == 0
@@ -344,6 +346,8 @@ def test_history_says_what_changed(path: str, run: Run) -> None:
         "change p1: reach 1.5",
         "change p1: to #112233",
         "change p1: from frame 1 to 3, fades of 2 frames",
+        "change p1: fades of 2 and 0.5 frames",
+        "change p1: fades of 2 frames",
         "change p1: the same new colour at all frames, all of its hue",
     ]
 

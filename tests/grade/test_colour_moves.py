@@ -202,17 +202,18 @@ def test_nothing_changes_outside_of_a_range(data: st.DataObject) -> None:
     two = Document(one.fields())
     start = data.draw(st.integers(first, last))
     until = data.draw(st.integers(start, last))
-    fade = data.draw(st.integers(0, 6))
+    fade, fade_out = data.draw(st.integers(0, 6)), data.draw(st.none() | st.integers(0, 6))
     handles = sorted(v["id"] for v in one.fields()["polytope"]["vertices"])
     id_ = data.draw(st.sampled_from([None, *handles]))
     ramp = data.draw(st.sampled_from([None, "smooth", "hold", "linear"]))
     two.set_ramp(data.draw(st.sampled_from(["smooth", "hold", "linear"])))
     two.adjust(id_, track=id_ is not None, by=(0.1, 0, 0), start=start, until=until, fade=fade,
-               ramp=ramp)  # fmt: skip
+               fade_out=fade_out, ramp=ramp)  # fmt: skip
+    fade_out = max(fade if fade_out is None else fade_out, 1)
     fade = max(fade, 1)
     for frame in range(first, last + 1):
         deltas = difference(one, two, frame).values()
-        if frame <= start - fade or frame >= until + fade:
+        if frame <= start - fade or frame >= until + fade_out:
             assert not any(delta.any() for delta in deltas), frame
         elif start <= frame <= until and id_ is None:
             assert all(delta == pytest.approx([0.1, 0, 0], abs=1e-9) for delta in deltas)
@@ -220,7 +221,7 @@ def test_nothing_changes_outside_of_a_range(data: st.DataObject) -> None:
             assert all(-1e-9 <= delta[0] <= 0.1 + 1e-9 for delta in deltas)
     pixels = np.random.default_rng(3).random((4, 4, 3), dtype=np.float32)
     for frame in range(first, last + 1):
-        if frame <= start - fade or frame >= until + fade:
+        if frame <= start - fade or frame >= until + fade_out:
             assert two.recolour(pixels, frame).tobytes() == pixels.tobytes()
 
 

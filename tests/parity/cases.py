@@ -284,7 +284,7 @@ def picked_documents() -> dict[str, Document]:
         path=[(2, (0.3, 0.3, 0.7), 1), (12, (0.25, 0.4, 0.6), 0.5), (25, (0.4, 0.4, 0.5), 1)],
     )  # fmt: skip
     # At other frames than its own it becomes one colour, and it is asked for from 9 to 20 only.
-    ranged = {**red, "toward": "colour", "from": 9, "until": 20, "fade": 3}
+    ranged = {**red, "toward": "colour", "from": 9, "until": 20, "fade": 3, "fade_out": 6}
     kept = hold("kept", (0.5, 0.4, 0.25), reach=-1)
     fading = hold("fading", (0.2, 0.2, 0.6), until=12, fade=10)
     off = {**green, "id": "off", "enabled": False}

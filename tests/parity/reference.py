@@ -375,9 +375,9 @@ def strength_of(pick: Document, frame: float, step: float) -> float:
     """How much of a pick's change is asked for at a frame."""
     if not pick.get("enabled", True):
         return 0.0
-    ramp = max(pick.get("fade", 0), step)
-    early = (pick.get("from", -np.inf) - frame) / ramp
-    late = (frame - pick.get("until", np.inf)) / ramp
+    fade = pick.get("fade", 0)
+    early = (pick.get("from", -np.inf) - frame) / max(fade, step)
+    late = (frame - pick.get("until", np.inf)) / max(pick.get("fade_out", fade), step)
     return float(np.clip(1 - max(early, late), 0, 1)) * on_path(pick, frame)[1]
 
 

@@ -179,14 +179,14 @@ def rows(hand: Hand) -> Iterator[Row]:
         lambda: drag(
             timeline, hand.end_of_range("p1", 2), hand.end_of_range("p1", 2) + _right(timeline), ALT
         ),
-        lambda: ["change", "p1", "--fade", 2],
+        lambda: ["change", "p1", "--fade-out", 2],
     )
     yield (
         "drag the tip of a fade",
         lambda: drag(
             timeline, hand.end_of_range("p1", 3), hand.end_of_range("p1", 2) + _right(timeline, 1)
         ),
-        lambda: ["change", "p1", "--fade", 1],
+        lambda: ["change", "p1", "--fade-out", 1],
     )
 
     def menu(*path: str) -> Callable[[], object]:
@@ -251,7 +251,7 @@ def rows(hand: Hand) -> Iterator[Row]:
     yield (
         "menu: fades",
         menu(texts.FADE, texts.FADE_OF.format(frames="5")),
-        lambda: ["change", "p1", "--fade", 5],
+        lambda: ["change", "p1", "--fade", 5, "--fade-out", 5],
     )
     yield "menu: remove", menu(texts.REMOVE), lambda: ["unpick", "p1"]
     yield (

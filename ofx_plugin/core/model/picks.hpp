@@ -41,6 +41,7 @@ struct Pick {
     bool toward_colour = false;  ///< at other frames: the same new colour, not the same change
     std::optional<double> from, until;  ///< first and last frame with the full change
     double fade = 0;                    ///< frames of the ramps before and after
+    std::optional<double> fade_out;     ///< of the ramp after, where it differs
     std::vector<PathKey> path;  ///< the colour at other frames, linear between; empty: always rgb
     std::shared_ptr<const Matte> matte;   ///< a learned one; null: that of the colour's hue
     std::shared_ptr<const HueMatte> hue;  ///< never null where `matte` is
@@ -50,6 +51,9 @@ struct Pick {
 
     /// The learned matte, else that of the hue. Throws std::invalid_argument without either.
     const Matte& taken() const;
+    /// The time from no change to the full one, and back. `step` as in strength_at().
+    double ramp_in(double step) const;
+    double ramp_out(double step) const;
     /// Where the colour is at a frame.
     Vec3 colour_at(double frame) const;
     /// The whole change that is asked for at a frame, without ramps.

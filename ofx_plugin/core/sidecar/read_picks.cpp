@@ -43,6 +43,7 @@ Pick read_pick(const Cursor& where, const PickMattes& mattes, Counts& counts) {
     pick.from = frame("from");
     pick.until = frame("until");
     pick.fade = number("fade", 0);
+    pick.fade_out = frame("fade_out");
     pick.enabled = fields.value("enabled", true);
     if (where.has("path")) {
         const Cursor path = where.member("path");

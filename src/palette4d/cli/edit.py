@@ -235,6 +235,12 @@ def _add_change(parser: argparse.ArgumentParser) -> None:
         help="frames of the ramps before A and after B (default: one frame)",
     )
     times.add_argument(
+        "--fade-out",
+        type=number(0),
+        metavar="N",
+        help="frames of the ramp after B (default: as --fade)",
+    )
+    times.add_argument(
         "--ramp", choices=RAMPS, help="the ramp of the changed handles, or of the fades of a range"
     )
 
@@ -338,6 +344,7 @@ def _how(args: argparse.Namespace) -> How:
         "start": args.start,
         "until": args.until,
         "fade": args.fade,
+        "fade_out": args.fade_out,
         "ramp": args.ramp,
         "any_value": args.any_value,
     }

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     Action = Callable[[str, str, str], argparse.ArgumentParser]
 
 _WHERE = "--frame T (--colour C | --pixel X,Y [--box N])"
-_WHEN = "[--from A] [--until B] [--fade N]"
-_RANGE = ("start", "until", "fade")
+_WHEN = "[--from A] [--until B] [--fade N] [--fade-out N]"
+_RANGE = ("start", "until", "fade", "fade_out")
 _MATTE = ("reach", "softness", "lightness", "whole_hue")
 
 
@@ -186,6 +186,12 @@ def _add_how(parser: argparse.ArgumentParser) -> None:
         type=number(0, 1e9),
         metavar="N",
         help="ramps of N frames before A and after B; beyond them nothing changes (default 0)",
+    )
+    add(
+        "--fade-out",
+        type=number(0, 1e9),
+        metavar="N",
+        help="a ramp of N frames after B (default: as --fade)",
     )
     add(
         "--follow",
@@ -377,12 +383,14 @@ def _print_pick(
 
 def _told(document: Document, pick: Pick, followed: bool = False) -> str:
     """Return a pick or hold for people: what was asked, and its path."""
+    from palette4d.grade.colour_moves import fades_text
+
     asked = shown(pick.rgb) + (f" -> {shown(pick.to)}" if pick.to is not None else " stays")
     lines = [f"{pick.id}: {pick.kind} at frame {pick.frame:g}: {asked}"]
     if pick.start is not None or pick.until is not None:
         start = "the start" if pick.start is None else f"frame {pick.start:g}"
         until = "the end" if pick.until is None else f"frame {pick.until:g}"
-        fade = f", ramps of {pick.fade:.3g} frames" if pick.fade else ""
+        fade = f", {fades_text(*pick.fades)}" if any(pick.fades) else ""
         lines[0] += f"; from {start} until {until}{fade}"
     if not pick.enabled:
         return f"{lines[0]}; disabled"

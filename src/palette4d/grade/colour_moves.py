@@ -23,18 +23,19 @@ class Range:
     ----------
     first, last : float
         The frames between which the move is full.
-    fade : float
+    fade, fade_out : float
         Frames of the ramps before and after, more than 0.
     """
 
     first: float
     last: float
     fade: float
+    fade_out: float
 
     def weight(self, frame: float) -> float:
         """Return the share of the move at a frame, 0..1."""
-        away = max(self.first - frame, frame - self.last, 0.0)
-        return max(0.0, 1 - away / self.fade)
+        away = max((self.first - frame) / self.fade, (frame - self.last) / self.fade_out, 0.0)
+        return max(0.0, 1 - away)
 
     @property
     def start(self) -> float:
@@ -44,7 +45,7 @@ class Range:
     @property
     def end(self) -> float:
         """The first frame after the move."""
-        return self.last + self.fade
+        return self.last + self.fade_out
 
 
 def shift(offset: Colour) -> Move:
@@ -77,7 +78,12 @@ def _luma(colour: Colour) -> float:
 
 
 def range_of(
-    start: float | None, until: float | None, fade: float | None, frames: tuple[int, int, int]
+    start: float | None,
+    until: float | None,
+    fade: float | None,
+    fade_out: float | None,
+    *,
+    frames: tuple[int, int, int],
 ) -> Range | None:
     """Return the range for frames that the user gave; None for the whole clip.
 
@@ -88,7 +94,7 @@ def range_of(
     """
     first, last, step = frames
     if start is None and until is None:
-        if fade is not None:
+        if fade is not None or fade_out is not None:
             raise Palette4dError(
                 "found a fade without a range; expected also its first or its last frame: "
                 f"{Arg('start')} or {Arg('until')}"
@@ -97,14 +103,22 @@ def range_of(
     # Without a first or last frame the range goes on beyond the clip.
     begin = min(first, until if until is not None else first) - step if start is None else start
     end = max(last, begin) + step if until is None else until
-    if not begin <= end or end < first or begin > last or not (fade is None or fade >= 0):
-        faded = f" with a fade of {fade:g}" if fade else ""
+    fade_in = fade or 0.0
+    fade_out = fade_in if fade_out is None else fade_out
+    if not begin <= end or end < first or begin > last or not (fade_in >= 0 and fade_out >= 0):
+        faded = f" with {fades_text(fade_in, fade_out)}" if fade_in or fade_out else ""
         raise Palette4dError(
             f"found the range {range_text(start, until)}{faded}; expected a range in order that "
-            f"meets the clip, which has the frames {first} to {last}, and a fade of 0 or more"
+            f"meets the clip, which has the frames {first} to {last}, and fades of 0 or more"
         )
     # Nothing is between two frames, so that a fade of one step is a cut.
-    return Range(float(begin), float(end), max(fade or 0.0, float(step)))
+    fades = (max(ramp, float(step)) for ramp in (fade_in, fade_out))
+    return Range(float(begin), float(end), *fades)
+
+
+def fades_text(before: float, after: float) -> str:
+    """Return the ramps of a range for people: "fades of 4 frames", "fades of 4 and 2 frames"."""
+    return f"fades of {before:g}{'' if before == after else f' and {after:g}'} frames"
 
 
 def range_text(start: float | None, until: float | None) -> str:

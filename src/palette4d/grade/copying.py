@@ -267,7 +267,7 @@ def _pick(match: Match, pick: Pick, into: Callable[[F64], F64] | None) -> Pick |
 
     # What is of the other clip is left out.
     copy = replace(pick, pixel=None, box=None, areas=(), path=(), matte=None)
-    copy = replace(copy, start=None, until=None, fade=0.0)
+    copy = replace(copy, start=None, until=None, fade=0.0, fade_out=None)
     if pick.to is not None:
         copy = replace(copy, to=colour(pick.to))
     if match.time == "relative":
@@ -279,6 +279,7 @@ def _pick(match: Match, pick: Pick, into: Callable[[F64], F64] | None) -> Pick |
             start=None if pick.start is None else time(pick.start),
             until=None if pick.until is None else time(pick.until),
             fade=pick.fade * match.pace,
+            fade_out=None if pick.fade_out is None else pick.fade_out * match.pace,
             path=tuple(replace(keys[f], frame=f, rgb=colour(keys[f].rgb)) for f in sorted(keys)),
         )
     moment = float(match.time)

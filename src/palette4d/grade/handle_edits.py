@@ -33,10 +33,10 @@ class How(TypedDict, total=False):
         Degrees added to the hue, in OKLCh of the displayed colour.
     chroma, lightness : float
         Factors of 0 or more, in OKLCh of the displayed colour.
-    start, until, fade : float, optional
+    start, until, fade, fade_out : float, optional
         Only from frame `start` to `until`, with ramps of `fade` frames (at least one frame
         step) before and after, and nothing beyond. A range without one end goes on to that end
-        of the clip.
+        of the clip. `fade_out` is the length of the ramp after it, if that differs.
     ramp : {"linear", "smooth", "hold"}, optional
         The ramp of the handles that move, or of the fades of a range.
     any_value : bool
@@ -51,6 +51,7 @@ class How(TypedDict, total=False):
     start: float | None
     until: float | None
     fade: float | None
+    fade_out: float | None
     ramp: str | None
     any_value: bool
 
@@ -89,8 +90,7 @@ def set_near(
     nearest = grade.near(wanted, frame=frame)
     if nearest.distance > FAR and not anyway:
         raise Palette4dError(nearest.refusal(wanted))
-    start, until, fade = how.get("start"), how.get("until"), how.get("fade")
-    if colour_moves.range_of(start, until, fade, grade.frames) is not None:
+    if _range(grade, how) is not None:
         time = frame if nearest.id in grade.handles.edges else None
         after, _ = adjust(grade, nearest.id, frame=time, **how)
         return after, replace(nearest, handle=None)
@@ -168,13 +168,12 @@ def adjust(
 
     Return also the ids of the vertices and stops that changed.
     """
-    start, until, fade = how.get("start"), how.get("until"), how.get("fade")
     if frame is not None and id is not None:
         grade.check_frame(frame)
         grade.check_inside(id, frame)
     elif id is not None and id not in grade.handles.edges:
         grade.frame_of(id, None)  # refuses unknown ids
-    within = colour_moves.range_of(start, until, fade, grade.frames)
+    within = _range(grade, how)
     ramp = how.get("ramp")
     known = None if ramp is None else as_ramp(ramp)
     move, what = _move(grade, id, frame, how)
@@ -182,7 +181,7 @@ def adjust(
     if rgb is not None and within is not None and within.weight(grade.frame_of(id, frame)) < 1:
         raise Palette4dError(
             f"the colour is meant at frame {grade.frame_of(id, frame):g}, outside of the "
-            f"range {colour_moves.range_text(start, until)}; expected a range with this frame"
+            f"range {_range_text(how)}; expected a range with this frame"
         )
     own = grade.settings.get(id or "")
     if id is None:
@@ -207,11 +206,21 @@ def adjust(
         locked = {n for kind, n in grade.state if kind == "lock" and n != id}
         changed = {n: setting for n, setting in changed.items() if n not in locked}
     if within is not None:
-        what += f" {colour_moves.range_text(start, until)}"
+        what += f" {_range_text(how)}"
     label = f"{'move' if rgb is None else 'set'} {name} {what}"
     values: dict[Key, Setting] = {("handle", n): setting for n, setting in changed.items()}
     moved = tuple(n for n, setting in changed.items() if grade.settings.get(n) != setting)
     return grade.having(values, label), moved
+
+
+def _range(grade: Grade, how: How) -> colour_moves.Range | None:
+    """Return the range that the user asked for; None: the whole clip."""
+    start, until, fades = how.get("start"), how.get("until"), (how.get("fade"), how.get("fade_out"))
+    return colour_moves.range_of(start, until, *fades, frames=grade.frames)
+
+
+def _range_text(how: How) -> str:
+    return colour_moves.range_text(how.get("start"), how.get("until"))
 
 
 def _move(

@@ -212,7 +212,7 @@ def _setting_fields(setting: Setting) -> Fields:
 
 
 def _pick(fields: Mapping[str, Any]) -> Pick:
-    for name in ("frame", "from", "until", "fade", "reach", "softness"):
+    for name in ("frame", "from", "until", "fade", "fade_out", "reach", "softness"):
         if type(fields.get(name)) not in (int, float, type(None)):
             raise ValueError(f"found the {name} {fields[name]!r}, expected a number")
     if fields["kind"] not in ("pick", "hold") or fields["frame"] is None:

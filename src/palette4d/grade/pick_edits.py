@@ -15,7 +15,7 @@ from palette4d.common.text import hex_of
 from palette4d.grade import recolouring
 from palette4d.grade.clip_colours import ClipColours
 from palette4d.grade.clip_of_picks import ClipOfPicks, corrected
-from palette4d.grade.colour_moves import range_text
+from palette4d.grade.colour_moves import fades_text, range_text
 from palette4d.grade.edits import VISIBLE, Key, as_colour, new_id
 from palette4d.grade.follow import Progress
 from palette4d.grade.grade import Grade
@@ -39,6 +39,7 @@ class When(Where, total=False):
     start: float | None
     until: float | None
     fade: float
+    fade_out: float | None
 
 
 class Asked(When, total=False):
@@ -59,7 +60,7 @@ class Asked(When, total=False):
     follow : bool
         Follow the colour through the clip. Without the clip, or without this, the pick is at
         the same colour in all frames.
-    toward, start, until, fade, whole_hue, reach, softness, lightness
+    toward, start, until, fade, fade_out, whole_hue, reach, softness, lightness
         Attributes of `palette4d.grade.picks.Pick`.
     any_value : bool
         Take colours such as 255 128 0 as they are.
@@ -169,9 +170,9 @@ def change_pick(
     bad = {"to", "toward", "whole_hue", "reach", "softness", "lightness"} & changes.keys()
     if old.kind == "hold" and bad:
         raise Palette4dError(f"{id} is a hold, which has no {' and no '.join(sorted(bad))}")
-    new = replace(old, **changes)
+    new = _with_one_fade(replace(old, **changes))
     _check(grade, new)
-    moved = {"frame", "rgb", "start", "until", "fade"} & changes.keys()
+    moved = {"frame", "rgb", "start", "until", "fade", "fade_out"} & changes.keys()
     if follow is False:
         new = replace(new, path=())
     elif follow or (moved and old.path):
@@ -277,7 +278,9 @@ def _add(
         start=asked.get("start"),
         until=asked.get("until"),
         fade=asked.get("fade", 0.0),
+        fade_out=asked.get("fade_out"),
     )
+    made = _with_one_fade(made)
     _check(grade, made)
     for area in made.areas:
         of_clip.check_places(area.frame, area.points)
@@ -343,7 +346,7 @@ def _changed(old: Pick, new: Pick) -> str:
             "all frames"
             if pick.start is None and pick.until is None
             else range_text(pick.start, pick.until),
-            f"fades of {pick.fade:g} frames",
+            fades_text(*pick.fades),
             f"the same {'new colour' if pick.toward == 'colour' else 'change'} at all frames",
             "all of its hue" if pick.whole_hue else "learned colours",
             f"reach {pick.reach:g}",
@@ -357,6 +360,11 @@ def _changed(old: Pick, new: Pick) -> str:
     return ", ".join(changes) or _asked(new)
 
 
+def _with_one_fade(pick: Pick) -> Pick:
+    """Return a pick without a fade of its own after the range, where it is the one before."""
+    return replace(pick, fade_out=None) if pick.fade_out == pick.fade else pick
+
+
 def _asked(pick: Pick) -> str:
     """Return what a pick asks for, for people: "#5ca832 to #803020 at frame 30"."""
     text = hex_of(pick.rgb)
@@ -365,6 +373,6 @@ def _asked(pick: Pick) -> str:
     text += f" at frame {pick.frame:g}"
     if pick.start is not None or pick.until is not None:
         text += f", {range_text(pick.start, pick.until)}"
-    if pick.fade:
-        text += f", fades of {pick.fade:g} frames"
+    if any(pick.fades):
+        text += f", {fades_text(*pick.fades)}"
     return text

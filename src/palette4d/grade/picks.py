@@ -37,7 +37,7 @@ MOST_REACH = 8.0
 
 #: Attributes with other names in a sidecar, and those that are frames or pixels.
 _NAMES = {"start": "from"}
-_WHOLE = {"frame", "start", "until", "fade", "pixel", "points", "radius"}
+_WHOLE = {"frame", "start", "until", "fade", "fade_out", "pixel", "points", "radius"}
 
 
 @dataclass(frozen=True)
@@ -98,6 +98,8 @@ class Pick:
         First and last frame with the full change; None: the clip's first and last.
     fade : float
         Frames of the ramps before `start` and after `until`.
+    fade_out : float or None
+        Frames of the ramp after `until`, where it is not as long as the one before `start`.
     enabled : bool
     path : tuple of PathKey
         Where the colour is at other frames, linear between the keys; empty: always `rgb`.
@@ -126,6 +128,7 @@ class Pick:
     start: float | None = None
     until: float | None = None
     fade: float = 0.0
+    fade_out: float | None = None
     enabled: bool = True
     path: tuple[PathKey, ...] = ()
     pixel: tuple[float, float] | None = None
@@ -239,8 +242,12 @@ class Pick:
         """
         start = -math.inf if self.start is None else self.start
         until = math.inf if self.until is None else self.until
-        ramp = max(self.fade, step)
-        return start - ramp, start, until, until + ramp
+        return start - max(self.fade, step), start, until, until + max(self.fades[1], step)
+
+    @property
+    def fades(self) -> tuple[float, float]:
+        """Frames of the ramps before and after the range."""
+        return self.fade, self.fade if self.fade_out is None else self.fade_out
 
     def strength_at(self, frame: float, step: float) -> float:
         """Return how much of the change is asked for at a frame, 0..1."""
@@ -276,8 +283,9 @@ def check(pick: Pick, frames: tuple[int, int, int]) -> None:
             f"found the range from frame {start:g} until {until:g}, expected a first frame that is "
             "not after the last one"
         )
-    if not 0 <= pick.fade <= 1e9:
-        raise Palette4dError(f"found a fade of {pick.fade:g} frames, expected 0 or more")
+    for fade in pick.fades:
+        if not 0 <= fade <= 1e9:
+            raise Palette4dError(f"found a fade of {fade:g} frames, expected 0 or more")
     if not -MOST_REACH <= pick.reach <= MOST_REACH:
         raise Palette4dError(
             f"found the reach {pick.reach:g}, expected {-MOST_REACH:g} to {MOST_REACH:g}, such as 1"

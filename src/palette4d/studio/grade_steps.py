@@ -6,6 +6,7 @@ It knows no toolkit. The verbs are those of `palette4d edit`; tests compare both
 from collections.abc import Callable
 from typing import Any
 
+from palette4d.grade.colour_moves import fades_text
 from palette4d.grade.document import Document, OfClip
 from palette4d.grade.edits import Ramp
 from palette4d.grade.follow import Progress
@@ -159,10 +160,16 @@ def add_area(session: Session, id_: str, area: Area) -> None:
     session.edit_later(add, texts.AREA_ADDED.format(id=id_))
 
 
-def set_fade(session: Session, id_: str, fade: float) -> None:
-    """Let a pick or hold fade over so many frames (`change`)."""
-    text = texts.FADE_SET.format(id=id_, frames=style.number(fade))
-    change_pick(session, id_, text, fade=fade)
+def set_fades(session: Session, id_: str, before: float, after: float) -> None:
+    """Let a pick or hold fade over so many frames before and after its range (`change`)."""
+    text = f"{id_}: {fades_text(before, after)}"
+    change_pick(session, id_, text, fade=before, fade_out=after)
+
+
+def pick_tip(session: Session, pick: Pick) -> str:
+    """Return the frames in which a pick acts, for a tip."""
+    start, until = map(style.number, range_of(session, pick))
+    return texts.PICK_TIP.format(start, until, fades_text(*pick.fades))
 
 
 def range_of(session: Session, pick: Pick) -> tuple[float, float]:

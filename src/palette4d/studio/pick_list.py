@@ -86,7 +86,7 @@ class PickList(QWidget):
                 0, Qt.CheckState.Checked if pick.enabled else Qt.CheckState.Unchecked
             )
             item.setIcon(0, self._icon(pick))
-            item.setToolTip(0, theme.plain(self._tip(pick)))
+            item.setToolTip(0, theme.plain(grade_steps.pick_tip(self.session, pick)))
             self.list.addTopLevelItem(item)
             item.setSelected(pick.id in self.session.selection)
         for id_ in locks:
@@ -111,11 +111,6 @@ class PickList(QWidget):
         if pick.start is not None or pick.until is not None:
             when = f"{style.number(start)} – {style.number(until)}"
         return [f"{pick.id} {kind} · {style.number(pick.frame)}", when if pick.enabled else "–"]
-
-    def _tip(self, pick: Pick) -> str:
-        start, until = grade_steps.range_of(self.session, pick)
-        ends = style.number(start), style.number(until), style.number(pick.fade)
-        return texts.PICK_TIP.format(*ends)
 
     def _icon(self, pick: Pick) -> QIcon:
         """Return the colour before and after; a hold has a bar across."""

@@ -96,10 +96,11 @@ def _add_pick(menu: QMenu, session: Session, pick: Pick) -> None:
         toward = changed(said, toward="shift" if same else "colour")
         entry(menu, texts.SAME_COLOUR, same, toward)
     fades = menu.addMenu(texts.FADE)
-    for fade in sorted({*FADES, pick.fade}):
+    for fade in sorted({*FADES, *pick.fades}):
         name = texts.FADE_OF.format(frames=style.number(fade)) if fade else texts.NO_FADE
-        faded = functools.partial(grade_steps.set_fade, session, pick.id, float(fade))
-        entry(fades, name, fade == pick.fade, faded)
+        both = float(fade), float(fade)
+        faded = functools.partial(grade_steps.set_fades, session, pick.id, *both)
+        entry(fades, name, both == pick.fades, faded)
 
 
 def _add_ramps(menu: QMenu, session: Session) -> None:

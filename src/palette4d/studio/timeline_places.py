@@ -74,8 +74,8 @@ class Places:
         Pixels that the rows are scrolled by.
     tall : float
         Rows are so many times as high as the room asks for.
-    dragged : (str, float, float, float) or None
-        A pick whose range is being dragged: start, until and fade.
+    dragged : (str, float, float, float, float) or None
+        A pick whose range is being dragged: start, until, and the fades before and after.
     """
 
     def __init__(self, session: Session, size: Callable[[], tuple[int, int]]) -> None:
@@ -85,7 +85,7 @@ class Places:
         self.zoomed: tuple[float, float] | None = None
         self.scroll = 0.0
         self.tall = 1.0
-        self.dragged: tuple[str, float, float, float] | None = None
+        self.dragged: tuple[str, float, float, float, float] | None = None
         self._palette: tuple[object, PlottedPalette, Rows] | None = None
         self._layout: tuple[object, Timeline, list[Disc]] | None = None
         self._lanes: tuple[int, list[tuple[Pick, int]]] | None = None
@@ -204,10 +204,10 @@ class Places:
         first, last, _ = self.session.frames
         start = float(first if pick.start is None else pick.start)
         until = float(last if pick.until is None else pick.until)
-        fade = pick.fade
+        before, after = pick.fades
         if self.dragged is not None and self.dragged[0] == pick.id:
-            _, start, until, fade = self.dragged
-        return max(start - fade, first), start, until, min(until + fade, last)
+            _, start, until, before, after = self.dragged
+        return max(start - before, first), start, until, min(until + after, last)
 
     def lane_y(self, lane: int) -> float:
         """Return the middle of a lane."""

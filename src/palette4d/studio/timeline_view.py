@@ -312,24 +312,23 @@ class TimelineView(QWidget):
         _, start, until, _ = self.places.reach(pick)
         frame = self.places.frame_at(x)
         first = hit.grip in ("start", "fade in")
-        wide = pick.fade if self.places.dragged is None else self.places.dragged[3]
-        if fade or hit.grip.startswith("fade"):
-            wide = max(start - frame if first else frame - until, 0.0)
+        fades = list(pick.fades if self.places.dragged is None else self.places.dragged[3:])
+        wide = max(start - frame if first else frame - until, 0.0)
+        fades_alone = fade or hit.grip.startswith("fade")
+        if fades_alone:
+            fades[0 if first else 1] = wide
         elif first:
             start = min(frame, until)
         else:
             until = max(frame, start)
-        self._tell_range(hit.grip, x, (start, until, wide), frame)
-        self.places.dragged = (hit.id, start, until, wide)
+        self._tell_range(None if fades_alone else start if first else until, x, wide)
+        self.places.dragged = (hit.id, start, until, fades[0], fades[1])
         self.update()
 
-    def _tell_range(
-        self, grip: str, x: float, ends: tuple[float, float, float], frame: float
-    ) -> None:
-        """Say what the end of a range becomes, or how long its fades are."""
-        start, until, wide = ends
-        self._tell(x, start if grip in ("start", "fade in") else until)
-        if self.painter.told is not None and (grip.startswith("fade") or frame not in ends[:2]):
+    def _tell_range(self, end: float | None, x: float, wide: float) -> None:
+        """Say what an end of a range becomes, or (None) how long the fade is."""
+        self._tell(x, wide if end is None else end)
+        if self.painter.told is not None and end is None:
             text = texts.FADE_OF.format(frames=style.number(wide))
             self.painter.told = self.painter.told[0], text
 
@@ -337,10 +336,10 @@ class TimelineView(QWidget):
         """Give the pick the range or the fade that was dragged."""
         if self.places.dragged is None:
             return
-        id_, start, until, fade = self.places.dragged
+        id_, start, until, *fades = self.places.dragged
         pick = next((pick for pick, _ in self.places.lanes() if pick.id == id_), None)
-        if pick is not None and fade != pick.fade:
-            grade_steps.set_fade(self.session, id_, fade)
+        if pick is not None and tuple(fades) != pick.fades:
+            grade_steps.set_fades(self.session, id_, fades[0], fades[1])
         elif pick is not None:
             grade_steps.set_range(self.session, id_, start, until)
 
@@ -409,9 +408,7 @@ class TimelineView(QWidget):
             return f"{self._row(hit.id)}: {self._called(hit.id)}\n{texts.ROW_TIP}"
         for pick, _ in self.places.lanes() if hit.what == "pick" else ():
             if pick.id == hit.id:
-                _, start, until, _ = self.places.reach(pick)
-                ends = style.number(start), style.number(until), style.number(pick.fade)
-                return f"{pick.id}: {texts.PICK_TIP.format(*ends)}"
+                return f"{pick.id}: {grade_steps.pick_tip(self.session, pick)}"
         return ""
 
     def _called(self, id_: str) -> str:

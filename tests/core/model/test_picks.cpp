@@ -86,6 +86,12 @@ TEST(a_pick_fades_in_before_its_range_and_out_after_it) {
     ranged.fade = 4;
     CHECK_EQUAL(ranged.strength_at(7, 1), 0.25);
     CHECK_EQUAL(ranged.strength_at(22, 1), 0.5);
+    ranged.fade_out = 8;
+    CHECK_EQUAL(ranged.strength_at(7, 1), 0.25);
+    CHECK_EQUAL(ranged.strength_at(22, 1), 0.75);
+    ranged.fade_out = 0;
+    CHECK_EQUAL(ranged.strength_at(20.5, 1), 0.5);
+    ranged.fade_out.reset();
     // Ramps that overlap: the smaller one.
     ranged.until = 6;
     CHECK_EQUAL(ranged.strength_at(8, 1), 0.5);
