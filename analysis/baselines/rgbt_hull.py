@@ -23,10 +23,8 @@ that does not change. Tracks are the hull's edges. Faces are slices of its facet
 stay flat and convex between two vertex times, with one fixed triangulation. All slices are closed,
 convex and oriented outwards.
 
-A slice without volume has one colour, two colours or a two-sided polygon, as in other palettes.
-The first or last slice may be flat (a fade from black), or all slices (grey or two-coloured clips).
-Colours within half an 8-bit step of a flat space over time are moved into that space. The space is
-a colour, line or plane that may move at constant speed. The move may leave the gamut by as much.
+The first or last slice may be flat (a fade from black). It has one colour, two colours or a
+two-sided polygon, as in other palettes. Colours that are flat all the time are refused.
 
 A solid clip needs four vertices at either end, so it never has fewer than eight.
 """
@@ -46,7 +44,8 @@ from palette4d.analysis.polytope import LEAST_COLOURS, Section, SkewPolytope
 from scipy.spatial import ConvexHull, QhullError
 
 from palette4d import _core
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
+from palette4d.common.text import counted
 
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
@@ -73,7 +72,7 @@ class _IllFormedError(Palette4dError):
     def __init__(self) -> None:
         super().__init__(
             "the convex hull in RGB and time is degenerate: its facets do not fit together; "
-            "expected colours that fill a volume or are exactly flat; another number of vertices "
+            "expected colours that fill a volume; another number of vertices "
             "may do"
         )
 
@@ -88,7 +87,7 @@ def rgbt_polytope(
 
     Parameters
     ----------
-    frames : at least one frame, in order of time.
+    frames : at least two frames, in order of time.
     gamut : the box that vertices are clipped to.
     vertices : the largest number of 4D vertices, at least `LEAST_VERTICES`. Clipping may leave
         fewer.
@@ -97,7 +96,8 @@ def rgbt_polytope(
     Raises
     ------
     Palette4dError
-        When fewer than `LEAST_VERTICES` vertices are asked for, or rounding leaves no usable hull.
+        When fewer than `LEAST_VERTICES` vertices are asked for, the colours fill no volume, or
+        rounding leaves no usable hull.
     """
     if vertices < LEAST_VERTICES:
         raise Palette4dError(
@@ -106,13 +106,23 @@ def rgbt_polytope(
         )
     numbers = np.array([frame.frame for frame in frames], float)
     points = all_extremes(frames, gamut)
-    if len(frames) > 1:
-        points = simplified(points, numbers[0], numbers[-1], gamut, vertices, progress)
-        points[:, 3] = _nearest(numbers, points[:, 3])
-        points[:, :3] = gamut.clip(points[:, :3])
-        return convex_polytope(points, numbers, gamut.scale)
-    colours = _simplified_colours(points[:, :3], gamut, vertices)
-    return _still(gamut.clip(colours), numbers[0], gamut.scale)
+    _refuse_flat(points, frames, gamut)
+    points = simplified(points, numbers[0], numbers[-1], gamut, vertices, progress)
+    points[:, 3] = _nearest(numbers, points[:, 3])
+    points[:, :3] = gamut.clip(points[:, :3])
+    return convex_polytope(points, numbers, gamut.scale)
+
+
+def _refuse_flat(points: F64, frames: Sequence[FrameStatistics], gamut: Gamut) -> None:
+    """Raise an error for colours without volume, apart from a motion at constant speed."""
+    with_time = np.column_stack([np.ones(len(points)), points[:, 3]])
+    still, *_ = np.linalg.lstsq(with_time, points[:, :3], rcond=None)
+    if len(frames) < 2 or len(_axes(points[:, :3] - with_time @ still, THIN * gamut.scale)) < 3:
+        raise Palette4dError(
+            f"a hull in RGB and time: found {counted(len(frames), 'frame')} whose colours fill no "
+            "volume in time, expected two frames or more whose colours do; use "
+            f"{Arg('method', 'static')}"
+        )
 
 
 def all_extremes(frames: Sequence[FrameStatistics], gamut: Gamut) -> F64:
@@ -137,17 +147,19 @@ def simplified(
     """Return at most `vertices` points, between the frames `first` and `last`, around the (n, 4)
     points.
 
-    More points are left only if the hull cannot be simplified further. Points without volume (see
-    `THIN`) are moved into the flat space around them.
+    More points are left only if the hull cannot be simplified further.
     """
-    flat = _Flat.around(_normalised(points, first, last, gamut), THIN)
-    hull = _hull(flat.coordinates)
     low, scale = gamut.low, gamut.scale
-    if hull.points.shape[1] > 1:
-        limits = flat.limits((gamut.high - low) / scale)
-        hull = _simplify(hull, vertices, limits, progress)
-        hull = _simplify(hull, vertices, limits[:2])  # limits in time alone, if too many are left
-    unit = flat.back(hull.points)
+    hull = _hull(_normalised(points, first, last, gamut))
+    # Rows a, b: a . (r, g, b, t) >= b. Time from 0 to 1, colours to `OVERSHOOT` beyond the gamut.
+    sides = np.eye(4)[[3, 0, 1, 2]]
+    most = np.concatenate([[1], (gamut.high - low) / scale + OVERSHOOT])
+    limits = np.column_stack(
+        [np.vstack([sides, -sides]), np.concatenate([[0.0], [-OVERSHOOT] * 3, -most])]
+    )
+    hull = _simplify(hull, vertices, limits, progress)
+    hull = _simplify(hull, vertices, limits[[0, 4]])  # limits in time alone, if too many are left
+    unit = hull.points
     return np.column_stack([low + scale * unit[:, :3], first + (last - first) * unit[:, 3]])
 
 
@@ -160,7 +172,7 @@ def convex_polytope(points: F64, frames: F64, scale: float = 1.0) -> SkewPolytop
     ----------
     points : every time is one of `frames`; the first and the last frame both occur.
     frames : (m,) frame numbers, increasing, at least two; each lies in a block of the result.
-    scale : the size of the colours; the tolerance for flat points is relative to it.
+    scale : the size of the colours.
 
     Raises
     ------
@@ -169,17 +181,13 @@ def convex_polytope(points: F64, frames: F64, scale: float = 1.0) -> SkewPolytop
     """
     points = np.unique(points[:, [3, 0, 1, 2]], axis=0)[:, [1, 2, 3, 0]]  # in order of time
     unit = _normalised(points, frames[0], frames[-1], Gamut(np.zeros(3), np.full(3, scale)))
-    flat = _Flat.around(unit, THIN)
-    if len(flat.axes) < 3:
-        points = np.column_stack([scale * flat.back(flat.coordinates)[:, :3], points[:, 3]])
-    rng = np.random.default_rng(0)
-    noise = rng.uniform(-1, 1, flat.coordinates.shape)
+    noise = np.random.default_rng(0).uniform(-1, 1, unit.shape)
     noise[:, -1] = 0
     for jitter in JITTERS:
         try:
-            moved = flat.coordinates + jitter * noise
+            moved = unit + jitter * noise
             hull = _hull(moved)
-            lattice = _Lattice(points[hull.used], hull, flat.back(moved)[hull.used])
+            lattice = _Lattice(points[hull.used], hull, moved[hull.used])
             return _sections(lattice, frames)
         except _IllFormedError:
             continue
@@ -244,7 +252,7 @@ def _simplify(
     while len(hull.points) > vertices:
         target = max(vertices, int(ROUND * len(hull.points)))
         try:
-            fewer = _hull(_core.progressive_hull_nd(hull.points, hull.simplices, target, limits))
+            fewer = _hull(_core.progressive_hull_4d(hull.points, hull.simplices, target, limits))
         except _IllFormedError:
             break
         if len(fewer.points) >= len(hull.points):
@@ -261,50 +269,6 @@ def _normalised(points: F64, first: float, last: float, gamut: Gamut) -> F64:
     """Colours in units of the gamut, and times in units of the clip's length."""
     colours = (points[:, :3] - gamut.low) / gamut.scale
     return np.column_stack([colours, (points[:, 3] - first) / (last - first)])
-
-
-@dataclasses.dataclass(frozen=True)
-class _Flat:
-    """Points r, g, b, t in the flat space that they fill: a moving origin, some colour axes, time.
-
-    rgb = origin + t * drift + coordinates[:, :-1] @ axes; the last coordinate is the time.
-    """
-
-    coordinates: F64
-    origin: F64
-    drift: F64
-    axes: F64
-
-    @classmethod
-    def around(cls, points: F64, tolerance: float) -> _Flat:
-        """Find the space of fewest dimensions that the (n, 4) points lie in within `tolerance`."""
-        t = points[:, 3:]
-        with_time = np.column_stack([np.ones_like(t), t])
-        (origin, drift), *_ = np.linalg.lstsq(with_time, points[:, :3], rcond=None)
-        axes = _axes(points[:, :3] - origin - t * drift, tolerance)
-        if len(axes) == 3:  # a solid clip: the colours are their own coordinates
-            origin, drift, axes = np.zeros(3), np.zeros(3), np.eye(3)
-        along = (points[:, :3] - origin - t * drift) @ axes.T
-        return cls(np.column_stack([along, t]), origin, drift, axes)
-
-    def limits(self, most: F64) -> F64:
-        """Return rows a, b for 0 <= t <= 1 and then for colours from 0 to `most`, and `OVERSHOOT`
-        beyond: a . coordinates >= b."""
-        d = self.coordinates.shape[1]
-        time = np.zeros((1, d + 1))
-        time[0, -2] = 1
-        colour = np.column_stack([self.axes.T, self.drift, -self.origin])
-        rows = np.vstack([time, time, colour, colour])
-        rows[1:2, -1] = 1
-        rows[2:5, -1] -= OVERSHOOT
-        rows[5:, -1] += most + OVERSHOOT
-        rows[[1, 5, 6, 7]] *= -1
-        return rows
-
-    def back(self, coordinates: F64) -> F64:
-        """Return (n, 4) points r, g, b, t from coordinates."""
-        t = coordinates[:, -1:]
-        return np.column_stack([self.origin + t * self.drift + coordinates[:, :-1] @ self.axes, t])
 
 
 def _axes(residual: F64, tolerance: float) -> F64:
@@ -328,33 +292,6 @@ def _extremes(rgb: F64, scale: float) -> F64:
         return rgb
 
 
-def _simplified_colours(rgb: F64, gamut: Gamut, vertices: int) -> F64:
-    """Return at most `vertices` colours around the (n, 3) colours of a single frame."""
-    scale = gamut.scale
-    axes = _axes(rgb, THIN * scale)
-    centre: F64 = rgb.mean(axis=0)
-    if len(axes) == 0:
-        return centre[None]
-    hull = _hull((rgb - centre) @ axes.T)
-    if len(axes) > 1:
-        floor = gamut.low - OVERSHOOT * scale - centre
-        ceiling = gamut.high + OVERSHOOT * scale - centre
-        limits = np.vstack([np.column_stack([axes.T, floor]), np.column_stack([-axes.T, -ceiling])])
-        hull = _simplify(hull, vertices, limits)
-        hull = _simplify(hull, vertices, limits[:0])
-    return centre + hull.points @ axes
-
-
-def _still(rgb: F64, frame: float, scale: float) -> SkewPolytope:
-    """Return the convex hull of (n, 3) colours as the polytope of a single frame."""
-    ends = [np.column_stack([rgb, np.full(len(rgb), frame + i)]) for i in range(2)]
-    prism = convex_polytope(np.vstack(ends), np.array([frame, frame + 1]), scale)
-    block = prism.blocks[0]
-    used = [track[0] for track in block.tracks]
-    tracks = tuple((i,) for i in range(len(used)))
-    return SkewPolytope(prism.vertices[used], (Section(frame, frame, tracks, block.faces),), ())
-
-
 def _nearest(numbers: F64, times: F64) -> F64:
     """Return the frame number nearest to each time, the earlier of two."""
     nearest: F64 = numbers[np.argmin(np.abs(times[:, None] - numbers[None]), axis=1)]
@@ -365,14 +302,13 @@ def _nearest(numbers: F64, times: F64) -> F64:
 
 
 class _Lattice:
-    """The vertices, edges and facets of a hull in d dimensions, the last of which is time.
+    """The vertices, edges and facets of a hull, whose last dimension is time.
 
     `shape` are the normalised vertices without duplicates, as the hull uses them.
     """
 
     def __init__(self, vertices: F64, hull: _Hull, shape: F64) -> None:
         self.vertices, self.shape = vertices, shape
-        self.dimensions = hull.points.shape[1]
         self.times, self.level = np.unique(vertices[:, 3], return_inverse=True)
         around: dict[Cut, set[int]] = {}
         for simplex, facet in zip(hull.simplices.tolist(), hull.facets.tolist(), strict=True):
@@ -380,13 +316,11 @@ class _Lattice:
                 around.setdefault((v,), set()).add(facet)
             for u, w in itertools.combinations(sorted(simplex, key=self._place), 2):
                 around.setdefault((u, w), set()).add(facet)
-        if self.dimensions == 1:
-            around[tuple(sorted((0, 1), key=self._place))] = set()
         # Fewer facets meet in the diagonals that triangulation adds to flat facets.
         self.facets = {
             cut: facets
             for cut, facets in sorted(around.items())
-            if len(cut) == 1 or len(facets) >= self.dimensions - 1
+            if len(cut) == 1 or len(facets) >= 3
         }
 
     def _place(self, v: int) -> tuple[int, int]:

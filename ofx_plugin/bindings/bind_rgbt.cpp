@@ -2,6 +2,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -30,49 +31,27 @@ std::vector<std::array<Number, M>> rows_of(const Array<Number>& array, const cha
     return out;
 }
 
-template <int N>
-DoubleArray simplify(const Array<double>& points, const Array<int>& simplices, int target,
-                     const Array<double>& limits) {
-    const auto p = rows_of<double, N>(points, "points");
-    const auto s = rows_of<int, N>(simplices, "simplices");
-    std::vector<Limit<N>> bounds;
-    for (const auto& row : rows_of<double, N + 1>(limits, "limits")) {
-        Limit<N> bound{};
-        for (int i = 0; i < N; ++i) bound.a[i] = row[i];
-        bound.b = row[N];
-        bounds.push_back(bound);
-    }
-    std::vector<std::array<double, N>> hull;
+DoubleArray simplified(const Array<double>& points, const Array<int>& simplices, int target,
+                       const Array<double>& limits) {
+    const auto p = rows_of<double, 4>(points, "points");
+    const auto s = rows_of<int, 4>(simplices, "simplices");
+    std::vector<HalfSpace<4>> bounds;
+    for (const auto& row : rows_of<double, 5>(limits, "limits"))
+        bounds.push_back({{row[0], row[1], row[2], row[3]}, row[4]});
+    std::vector<std::array<double, 4>> hull;
     {
         py::gil_scoped_release release;
-        hull = progressive_hull_nd<N>(p, s, target, bounds);
+        hull = progressive_hull_4d(p, s, target, bounds);
     }
-    DoubleArray out({static_cast<py::ssize_t>(hull.size()), static_cast<py::ssize_t>(N)});
+    DoubleArray out({static_cast<py::ssize_t>(hull.size()), py::ssize_t{4}});
     double* to = out.mutable_data();
-    for (const auto& row : hull)
-        for (const double x : row) *to++ = x;
+    for (const auto& row : hull) to = std::copy(row.begin(), row.end(), to);
     return out;
 }
 
 }  // namespace
 
 void bind_rgbt(py::module_& m) {
-    m.def(
-        "progressive_hull_nd",
-        [](const Array<double>& points, const Array<int>& simplices, int target,
-           const Array<double>& limits) {
-            const py::ssize_t dimensions = points.ndim() == 2 ? points.shape(1) : 0;
-            switch (dimensions) {
-                case 2:
-                    return simplify<2>(points, simplices, target, limits);
-                case 3:
-                    return simplify<3>(points, simplices, target, limits);
-                case 4:
-                    return simplify<4>(points, simplices, target, limits);
-                default:
-                    throw py::value_error("points: found shape " + shape_text(points) +
-                                          ", expected (n, 2), (n, 3) or (n, 4)");
-            }
-        },
-        py::arg("points"), py::arg("simplices"), py::arg("target"), py::arg("limits"));
+    m.def("progressive_hull_4d", &simplified, py::arg("points"), py::arg("simplices"),
+          py::arg("target"), py::arg("limits"));
 }

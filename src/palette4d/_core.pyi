@@ -527,10 +527,10 @@ def find_links(
 def progressive_hull(rgb: ArrayLike, faces: ArrayLike, target: int) -> F64:
     """Simplify a closed convex mesh, (n, 3) and (f, 3), to at most `target` enclosing vertices."""
 
-def progressive_hull_nd(
+def progressive_hull_4d(
     points: ArrayLike, simplices: ArrayLike, target: int, limits: ArrayLike
 ) -> F64:
-    """Simplify a convex hull in 2, 3 or 4 dimensions to at most `target` enclosing vertices.
+    """Simplify a convex hull in four dimensions to at most `target` enclosing vertices.
 
-    (n, d) points, (m, d) facets, (l, d + 1) limits a, b on new vertices: a . x >= b.
+    (n, 4) points, (m, 4) facets, (l, 5) limits a, b on new vertices: a . x >= b.
     """

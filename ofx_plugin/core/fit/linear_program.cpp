@@ -153,14 +153,6 @@ template std::optional<std::array<double, 3>> minimise<3>(const std::array<doubl
                                                           const std::vector<HalfSpace<3>>&,
                                                           const std::array<double, 3>&,
                                                           const std::array<double, 3>&);
-template std::optional<std::array<double, 2>> minimise_by_need<2>(const std::array<double, 2>&,
-                                                                  const std::vector<HalfSpace<2>>&,
-                                                                  const std::array<double, 2>&,
-                                                                  const std::array<double, 2>&);
-template std::optional<std::array<double, 3>> minimise_by_need<3>(const std::array<double, 3>&,
-                                                                  const std::vector<HalfSpace<3>>&,
-                                                                  const std::array<double, 3>&,
-                                                                  const std::array<double, 3>&);
 template std::optional<std::array<double, 4>> minimise_by_need<4>(const std::array<double, 4>&,
                                                                   const std::vector<HalfSpace<4>>&,
                                                                   const std::array<double, 4>&,

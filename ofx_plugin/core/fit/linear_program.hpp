@@ -25,7 +25,7 @@ std::optional<std::array<double, N>> minimise(const std::array<double, N>& c,
                                               const std::array<double, N>& high);
 
 /// The same optimum, but the most violated constraint is added next, so few are added; this pays in
-/// four dimensions. Where several points are optimal, the two functions may differ. N is 2 to 4.
+/// four dimensions. Where several points are optimal, the two functions may differ. N is 4.
 template <int N>
 std::optional<std::array<double, N>> minimise_by_need(const std::array<double, N>& c,
                                                       const std::vector<HalfSpace<N>>& constraints,

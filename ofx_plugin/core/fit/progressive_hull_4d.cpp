@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "fit/linear_program.hpp"
+#include "model/vec3.hpp"
 
 namespace palette4d {
 namespace {
@@ -19,10 +20,9 @@ namespace {
 constexpr double kBound = 4;  // new vertices stay within [-kBound, 1 + kBound] of a unit cube
 constexpr double kThin = 1e-14;
 
-template <int N>
-using Point = std::array<double, N>;
-template <int N>
-using Simplex = std::array<int, N>;
+using Point = std::array<double, 4>;
+using Simplex = std::array<int, 4>;
+using Plane = HalfSpace<4>;
 /// A face of a link, or a ridge: at most three vertices, increasing, 21 bits each, never 0.
 using FaceKey = std::uint64_t;
 constexpr int kKeyBits = 21;
@@ -37,48 +37,31 @@ void sort_few(int* numbers, int count) {
             std::swap(numbers[j], numbers[j - 1]);
 }
 
-template <int N>
-double dot(const Point<N>& a, const Point<N>& b) {
+double dot(const Point& a, const Point& b) {
     double sum = 0;
-    for (int i = 0; i < N; ++i) sum += a[i] * b[i];
+    for (int i = 0; i < 4; ++i) sum += a[i] * b[i];
     return sum;
 }
 
-/// The vector perpendicular to N - 1 vectors: the cofactors of a determinant's first row. Its
-/// product with x - p is N! times the volume of the simplex between the facet and x.
-template <int N>
-Point<N> normal_of(const std::array<Point<N>, N - 1>& rows);
-
-template <>
-Point<2> normal_of<2>(const std::array<Point<2>, 1>& rows) {
-    return {rows[0][1], -rows[0][0]};
-}
-
-template <>
-Point<3> normal_of<3>(const std::array<Point<3>, 2>& rows) {
-    const auto& [u, v] = rows;
-    return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
-}
-
-template <>
-Point<4> normal_of<4>(const std::array<Point<4>, 3>& rows) {
-    Point<4> out;
+/// The vector perpendicular to three vectors: the cofactors of a determinant's first row. Its
+/// product with x - p is 4! times the volume of the simplex between the facet and x.
+Point normal_of(const std::array<Point, 3>& rows) {
+    Point out;
     for (int skip = 0; skip < 4; ++skip) {
-        std::array<Point<3>, 3> m;
+        std::array<Vec3, 3> m;
         for (int r = 0; r < 3; ++r)
             for (int c = 0, to = 0; c < 4; ++c)
                 if (c != skip) m[r][to++] = rows[r][c];
-        const double minor = dot<3>(m[0], normal_of<3>({m[1], m[2]}));
+        const double minor = palette4d::dot(m[0], cross(m[1], m[2]));
         out[skip] = skip % 2 == 0 ? minor : -minor;
     }
     return out;
 }
 
-template <int N>
 class Hull {
 public:
-    Hull(const std::vector<Point<N>>& points, const std::vector<Simplex<N>>& simplices,
-         const std::vector<HalfSpace<N>>& limits)
+    Hull(const std::vector<Point>& points, const std::vector<Simplex>& simplices,
+         const std::vector<Plane>& limits)
         : points_(points),
           simplices_(simplices),
           planes_(simplices.size()),
@@ -88,22 +71,22 @@ public:
           limits_(limits) {
         for (int s = 0; s < static_cast<int>(simplices_.size()); ++s)
             for (int v : simplices_[s]) stars_[v].push_back(s);
-        Point<N> centre{};
+        Point centre{};
         for (std::size_t v = 0; v < points_.size(); ++v) {
             if (stars_[v].empty()) continue;
             ++left_;
-            for (int i = 0; i < N; ++i) centre[i] += points_[v][i];
+            for (int i = 0; i < 4; ++i) centre[i] += points_[v][i];
         }
         for (double& x : centre) x /= left_;
         for (int s = 0; s < static_cast<int>(simplices_.size()); ++s) {
             planes_[s] = plane_of(simplices_[s]);
-            if (dot<N>(planes_[s].a, centre) < planes_[s].b) continue;
+            if (dot(planes_[s].a, centre) < planes_[s].b) continue;
             std::swap(simplices_[s][0], simplices_[s][1]);
             planes_[s] = plane_of(simplices_[s]);
         }
     }
 
-    std::vector<Point<N>> simplify(int target) {
+    std::vector<Point> simplify(int target) {
         for (int v = 0; v < static_cast<int>(points_.size()); ++v)
             for (int w : neighbours(v))
                 if (v < w) evaluate(v, w);
@@ -118,7 +101,7 @@ public:
             else
                 contract(entry);
         }
-        std::vector<Point<N>> out;
+        std::vector<Point> out;
         for (std::size_t v = 0; v < points_.size(); ++v)
             if (!stars_[v].empty()) out.push_back(points_[v]);
         return out;
@@ -129,7 +112,7 @@ private:
         double volume;
         int a, b;
         long stamp;
-        Point<N> x;
+        Point x;
         bool operator<(const Entry& o) const {  // the queue's top is the smallest volume
             if (volume != o.volume) return volume > o.volume;
             return a != o.a ? a > o.a : b > o.b;
@@ -137,12 +120,12 @@ private:
     };
 
     /// The facet's plane a . x = b. a is the outward normal, (N - 1)! times the area long.
-    HalfSpace<N> plane_of(const Simplex<N>& s) const {
-        std::array<Point<N>, N - 1> rows;
-        for (int r = 1; r < N; ++r)
-            for (int i = 0; i < N; ++i) rows[r - 1][i] = points_[s[r]][i] - points_[s[0]][i];
-        const Point<N> a = normal_of<N>(rows);
-        return {a, dot<N>(a, points_[s[0]])};
+    Plane plane_of(const Simplex& s) const {
+        std::array<Point, 3> rows;
+        for (int r = 1; r < 4; ++r)
+            for (int i = 0; i < 4; ++i) rows[r - 1][i] = points_[s[r]][i] - points_[s[0]][i];
+        const Point a = normal_of(rows);
+        return {a, dot(a, points_[s[0]])};
     }
 
     std::vector<int> neighbours(int v) const {
@@ -164,7 +147,7 @@ private:
         std::vector<FaceKey> out;
         for (int s : stars_[v]) {
             if (!has(s, w)) continue;
-            std::array<int, N> rest;
+            Simplex rest;
             int count = 0;
             for (int u : simplices_[s])
                 if (u != v && u != w) rest[count++] = u;
@@ -205,27 +188,27 @@ private:
         std::vector<int> around;
         std::set_union(stars_[a].begin(), stars_[a].end(), stars_[b].begin(), stars_[b].end(),
                        std::back_inserter(around));
-        Point<N> objective{};
+        Point objective{};
         double constant = 0;
-        std::vector<HalfSpace<N>> constraints(limits_);
+        std::vector<Plane> constraints(limits_);
         for (int s : around) {
-            HalfSpace<N> plane = planes_[s];
-            for (int i = 0; i < N; ++i) objective[i] += plane.a[i];
+            Plane plane = planes_[s];
+            for (int i = 0; i < 4; ++i) objective[i] += plane.a[i];
             constant -= plane.b;
-            const double length = std::sqrt(dot<N>(plane.a, plane.a));
+            const double length = std::sqrt(dot(plane.a, plane.a));
             if (length < kThin) continue;
             for (double& x : plane.a) x /= length;
             plane.b /= length;
             constraints.push_back(plane);
         }
-        Point<N> low, high;
+        Point low, high;
         low.fill(-kBound);
         high.fill(1 + kBound);
-        const auto x = minimise_by_need<N>(objective, constraints, low, high);
+        const auto x = minimise_by_need<4>(objective, constraints, low, high);
         if (!x) return;
         waiting_.erase({a, b});
         stamp_[{a, b}] = ++clock_;
-        queue_.push({std::max(0.0, dot<N>(objective, *x) + constant), a, b, clock_, *x});
+        queue_.push({std::max(0.0, dot(objective, *x) + constant), a, b, clock_, *x});
     }
 
     void contract(const Entry& entry) {
@@ -274,13 +257,13 @@ private:
         for (const auto& [v, w] : again) evaluate(v, w);
     }
 
-    std::vector<Point<N>> points_;
-    std::vector<Simplex<N>> simplices_;
-    std::vector<HalfSpace<N>> planes_;
+    std::vector<Point> points_;
+    std::vector<Simplex> simplices_;
+    std::vector<Plane> planes_;
     std::vector<std::vector<int>> stars_;      // facets at each vertex, increasing
     std::vector<std::vector<FaceKey>> links_;  // links of vertices that were requested
     std::vector<long> touched_;                // when a facet at the vertex last changed
-    std::vector<HalfSpace<N>> limits_;
+    std::vector<Plane> limits_;
     std::map<std::pair<int, int>, long> stamp_;
     std::set<std::pair<int, int>> waiting_;  // edges that cannot be contracted now
     std::priority_queue<Entry> queue_;
@@ -288,31 +271,30 @@ private:
     int left_ = 0;
 };
 
-template <int N>
-void check(const std::vector<Point<N>>& points, const std::vector<Simplex<N>>& simplices,
-           const std::vector<Limit<N>>& limits) {
-    for (const Point<N>& p : points)
+void check(const std::vector<Point>& points, const std::vector<Simplex>& simplices,
+           const std::vector<Plane>& limits) {
+    for (const Point& p : points)
         for (double x : p)
             if (!std::isfinite(x))
                 throw std::invalid_argument("a progressive hull needs finite points");
-    for (const Limit<N>& limit : limits)
-        if (!std::isfinite(limit.b) || !std::isfinite(dot<N>(limit.a, limit.a)))
+    for (const Plane& limit : limits)
+        if (!std::isfinite(limit.b) || !std::isfinite(dot(limit.a, limit.a)))
             throw std::invalid_argument("a progressive hull needs finite limits");
     if (points.size() > kMostPoints)
         throw std::invalid_argument("a progressive hull takes at most " +
                                     std::to_string(kMostPoints) + " points, found " +
                                     std::to_string(points.size()));
     std::vector<FaceKey> ridges;
-    for (const Simplex<N>& s : simplices) {
+    for (const Simplex& s : simplices) {
         for (int v : s)
             if (v < 0 || v >= static_cast<int>(points.size()))
                 throw std::invalid_argument("a facet names point " + std::to_string(v) + " of " +
                                             std::to_string(points.size()));
-        Simplex<N> sorted = s;
-        sort_few(sorted.data(), N);
-        for (int skip = 0; skip < N; ++skip) {
+        Simplex sorted = s;
+        sort_few(sorted.data(), 4);
+        for (int skip = 0; skip < 4; ++skip) {
             FaceKey ridge = 0;
-            for (int i = 0; i < N; ++i)
+            for (int i = 0; i < 4; ++i)
                 if (i != skip) ridge = with_vertex(ridge, sorted[i]);
             ridges.push_back(ridge);
         }
@@ -329,49 +311,37 @@ void check(const std::vector<Point<N>>& points, const std::vector<Simplex<N>>& s
 
 }  // namespace
 
-template <int N>
-std::vector<std::array<double, N>> progressive_hull_nd(
-    const std::vector<std::array<double, N>>& points,
-    const std::vector<std::array<int, N>>& simplices, int target,
-    const std::vector<Limit<N>>& limits) {
-    check<N>(points, simplices, limits);
+std::vector<Point> progressive_hull_4d(const std::vector<Point>& points,
+                                       const std::vector<Simplex>& simplices, int target,
+                                       const std::vector<Plane>& limits) {
+    check(points, simplices, limits);
     // Bounds and tolerances assume unit size; scaling keeps the order of volumes.
-    Point<N> low = points[simplices[0][0]], extent{};
-    for (const Simplex<N>& s : simplices)
+    Point low = points[simplices[0][0]], extent{};
+    for (const Simplex& s : simplices)
         for (int v : s)
-            for (int i = 0; i < N; ++i) low[i] = std::min(low[i], points[v][i]);
-    for (const Simplex<N>& s : simplices)
+            for (int i = 0; i < 4; ++i) low[i] = std::min(low[i], points[v][i]);
+    for (const Simplex& s : simplices)
         for (int v : s)
-            for (int i = 0; i < N; ++i) extent[i] = std::max(extent[i], points[v][i] - low[i]);
+            for (int i = 0; i < 4; ++i) extent[i] = std::max(extent[i], points[v][i] - low[i]);
     for (double& x : extent)
         if (!(x > 0)) x = 1;
-    std::vector<Point<N>> unit(points);
-    for (Point<N>& p : unit)
-        for (int i = 0; i < N; ++i) p[i] = (p[i] - low[i]) / extent[i];
-    std::vector<HalfSpace<N>> bounds;
-    for (const Limit<N>& limit : limits) {
-        HalfSpace<N> bound{limit.a, limit.b - dot<N>(limit.a, low)};
-        for (int i = 0; i < N; ++i) bound.a[i] *= extent[i];
-        const double length = std::sqrt(dot<N>(bound.a, bound.a));
+    std::vector<Point> unit(points);
+    for (Point& p : unit)
+        for (int i = 0; i < 4; ++i) p[i] = (p[i] - low[i]) / extent[i];
+    std::vector<Plane> bounds;
+    for (const Plane& limit : limits) {
+        Plane bound{limit.a, limit.b - dot(limit.a, low)};
+        for (int i = 0; i < 4; ++i) bound.a[i] *= extent[i];
+        const double length = std::sqrt(dot(bound.a, bound.a));
         if (!(length > 0)) continue;
         for (double& x : bound.a) x /= length;
         bound.b /= length;
         bounds.push_back(bound);
     }
-    std::vector<Point<N>> out = Hull<N>(unit, simplices, bounds).simplify(std::max(N + 1, target));
-    for (Point<N>& p : out)
-        for (int i = 0; i < N; ++i) p[i] = low[i] + extent[i] * p[i];
+    std::vector<Point> out = Hull(unit, simplices, bounds).simplify(std::max(5, target));
+    for (Point& p : out)
+        for (int i = 0; i < 4; ++i) p[i] = low[i] + extent[i] * p[i];
     return out;
 }
-
-template std::vector<std::array<double, 2>> progressive_hull_nd<2>(
-    const std::vector<std::array<double, 2>>&, const std::vector<std::array<int, 2>>&, int,
-    const std::vector<Limit<2>>&);
-template std::vector<std::array<double, 3>> progressive_hull_nd<3>(
-    const std::vector<std::array<double, 3>>&, const std::vector<std::array<int, 3>>&, int,
-    const std::vector<Limit<3>>&);
-template std::vector<std::array<double, 4>> progressive_hull_nd<4>(
-    const std::vector<std::array<double, 4>>&, const std::vector<std::array<int, 4>>&, int,
-    const std::vector<Limit<4>>&);
 
 }  // namespace palette4d

@@ -35,32 +35,10 @@ def lattice(seed, n=3):
     return (values / (n - 1)).astype(np.float32)
 
 
-def turning(i):
-    """One colour on a curve that fills all four dimensions."""
-    angle = 0.7 * i
-    return constant([0.5 + 0.4 * np.cos(angle), 0.5 + 0.4 * np.sin(angle), 0.5 + np.sin(2 * i) / 3])
-
-
 # name: frames, fewest and most colours of a slice (None: any)
 CLIPS = {
     "two frames": ([noise(1), noise(2)], (4, None)),
-    "one colour": ([constant([0.3, 0.4, 0.5])] * 5, (1, 1)),
-    "one colour at constant speed": (
-        [constant([0.1 + 0.1 * i, 0.4, 0.5]) for i in range(5)],
-        (1, 1),
-    ),
-    "one colour on a parabola": (
-        [constant([0.1 + 0.04 * i**2, 0.4, 0.5]) for i in range(5)],
-        (1, 2),
-    ),
-    "one colour on a curve": ([turning(i) for i in range(9)], (1, None)),
-    "black": ([constant([0, 0, 0])] * 4, (1, 1)),
-    "grey": ([grey(i) for i in range(5)], (2, 2)),
-    "a plane": ([flat(i) for i in range(3)], (3, None)),
-    "nearly grey": ([grey(i) + noise(i, 0.001) for i in range(4)], (2, 2)),
-    "nearly a plane": ([flat(i) + noise(i, 0.003) for i in range(4)], (3, None)),
     "just solid": ([flat(i) + noise(i, 0.006) for i in range(4)], (4, None)),
-    "one pixel": ([noise(i)[:1, :1] for i in range(3)], (1, 2)),
     "three pixels": ([noise(i)[:1, :3] for i in range(3)], (3, None)),
     "float above one and below zero": ([noise(i, 8, -1) for i in range(3)], (4, None)),
     "large values": ([noise(i, 1e4) for i in range(3)], (4, None)),
@@ -215,49 +193,20 @@ def test_everything_is_enclosed_before_clipping(vertices):
         assert farthest_outside(np.column_stack([frame.colours.rgb, t]), hull) < 1e-7
 
 
-def test_flat_colours_are_enclosed_within_their_plane():
-    frames = frames_of([flat(i) for i in range(5)])
-    gamut = Gamut.of(frames)
-    around = rgbt_hull.simplified(rgbt_hull.all_extremes(frames, gamut), 1001, 1005, gamut, 10)
-    assert len(around) <= 10
-    np.testing.assert_allclose(around[:, 2], 0.5, atol=1e-7)
-    hull = ConvexHull(around[:, [0, 1, 3]])
-    for frame in frames:
-        t = np.full(len(frame.colours.rgb), float(frame.frame))
-        inside = np.column_stack([frame.colours.rgb[:, :2], t])
-        assert farthest_outside(inside, hull) < 1e-6
-
-
 @pytest.mark.parametrize(
-    ("image", "colours"),
-    [(noise(1), None), (grey(1), 2), (constant([0.2, 0.3, 0.4]), 1), (lattice(0, 2), 8)],
-    ids=["noise", "grey", "one colour", "a cube"],
+    "images",
+    [
+        [noise(1)],
+        [constant([0.3, 0.4, 0.5])] * 5,
+        [constant([0.1 + 0.1 * i, 0.4, 0.5]) for i in range(5)],
+        [grey(i) + noise(i, 0.001) for i in range(4)],
+        [flat(i) + noise(i, 0.003) for i in range(4)],
+    ],
+    ids=["one frame", "one colour", "one that moves evenly", "nearly grey", "nearly a plane"],
 )
-def test_one_frame(image, colours):
-    (frame,), polytope = analysed([image], 12)
-    assert len(polytope.blocks) == 1
-    assert not polytope.transitions
-    piece = _core.slice_at(sidecar.validate(document(polytope)).polytope, 1001)
-    assert len(piece.rgb) <= 12
-    if colours is not None:
-        assert len(piece.rgb) == colours
-    if len(piece.faces):
-        hull = ConvexHull(polytope.vertices[:, :3])
-        assert signed_volume(piece.rgb, piece.faces) == pytest.approx(hull.volume)
-        assert farthest_outside(frame.colours.rgb, hull) < 0.15  # clipped to the gamut
-
-
-def test_one_flat_frame_is_a_two_sided_polygon():
-    (frame,), polytope = analysed([flat(1)], 8)
-    piece = _core.slice_at(sidecar.validate(document(polytope)).polytope, 1001)
-    assert 3 <= len(piece.rgb) <= 8
-    np.testing.assert_allclose(piece.rgb[:, 2], 0.5, atol=1e-12)
-    a, b, c = (piece.rgb[piece.faces[:, i], :2] for i in range(3))
-    areas = np.cross(np.pad(b - a, ((0, 0), (0, 1))), np.pad(c - a, ((0, 0), (0, 1))))[:, 2] / 2
-    area = ConvexHull(piece.rgb[:, :2]).volume
-    assert areas[areas > 0].sum() == pytest.approx(area)
-    assert areas[areas < 0].sum() == pytest.approx(-area)
-    assert ConvexHull(frame.colours.rgb[:, :2]).volume < area + 0.1
+def test_colours_without_volume_are_refused(images):
+    with pytest.raises(Palette4dError, match="fill no volume"):
+        analysed(images)
 
 
 def test_a_clip_that_does_not_change_is_one_block():

@@ -15,19 +15,17 @@ using namespace palette4d;
 
 namespace {
 
-template <int N>
+constexpr int N = 4;
 using Point = std::array<double, N>;
 
-template <int N>
 struct Mesh {
-    std::vector<Point<N>> points;
+    std::vector<Point> points;
     std::vector<std::array<int, N>> simplices;
 };
 
 /// The plane through N points as N + 1 numbers, a . x + b = 0, by elimination; all 0 when the
 /// points lie in less than a plane. (The core takes cofactors.)
-template <int N>
-std::array<double, N + 1> plane_through(const std::array<Point<N>, N>& p) {
+std::array<double, N + 1> plane_through(const std::array<Point, N>& p) {
     std::array<std::array<double, N + 1>, N> m;
     for (int r = 0; r < N; ++r) {
         std::copy(p[r].begin(), p[r].end(), m[r].begin());
@@ -61,8 +59,7 @@ std::array<double, N + 1> plane_through(const std::array<Point<N>, N>& p) {
     return plane;
 }
 
-template <int N>
-double height(const std::array<double, N + 1>& plane, const Point<N>& p) {
+double height(const std::array<double, N + 1>& plane, const Point& p) {
     double sum = plane[N];
     for (int c = 0; c < N; ++c) sum += plane[c] * p[c];
     return sum;
@@ -70,19 +67,19 @@ double height(const std::array<double, N + 1>& plane, const Point<N>& p) {
 
 /// Calls action(indices, plane turned outwards) for every facet of the convex hull: every choice of
 /// N points whose plane has all others on one side.
-template <int N, class Action>
-void each_facet(const std::vector<Point<N>>& points, Action action) {
+template <class Action>
+void each_facet(const std::vector<Point>& points, Action action) {
     std::array<int, N> at;
     for (int i = 0; i < N; ++i) at[i] = i;
     const int n = static_cast<int>(points.size());
     while (true) {
-        std::array<Point<N>, N> corners;
+        std::array<Point, N> corners;
         for (int i = 0; i < N; ++i) corners[i] = points[at[i]];
-        auto plane = plane_through<N>(corners);
+        auto plane = plane_through(corners);
         double low = 0, high = 0;
-        for (const Point<N>& p : points) {
-            low = std::min(low, height<N>(plane, p));
-            high = std::max(high, height<N>(plane, p));
+        for (const Point& p : points) {
+            low = std::min(low, height(plane, p));
+            high = std::max(high, height(plane, p));
         }
         if (high > -low)
             for (double& x : plane) x = -x;
@@ -96,12 +93,11 @@ void each_facet(const std::vector<Point<N>>& points, Action action) {
 }
 
 /// The hull of random points on a sphere: all of them are its vertices.
-template <int N>
-Mesh<N> random_hull(std::uint64_t seed, int count) {
+Mesh random_hull(std::uint64_t seed, int count) {
     shapes::Random random(seed);
-    Mesh<N> mesh;
+    Mesh mesh;
     while (static_cast<int>(mesh.points.size()) < count) {
-        Point<N> p;
+        Point p;
         double length = 0;
         for (double& x : p) {
             x = random.uniform(-1, 1);
@@ -111,27 +107,25 @@ Mesh<N> random_hull(std::uint64_t seed, int count) {
         for (double& x : p) x = 0.5 + 0.4 * x / std::sqrt(length);
         mesh.points.push_back(p);
     }
-    each_facet<N>(mesh.points,
-                  [&](const std::array<int, N>& at, const auto&) { mesh.simplices.push_back(at); });
+    each_facet(mesh.points,
+               [&](const std::array<int, N>& at, const auto&) { mesh.simplices.push_back(at); });
     return mesh;
 }
 
-template <int N>
-double farthest_outside(const std::vector<Point<N>>& inner, const std::vector<Point<N>>& outer) {
+double farthest_outside(const std::vector<Point>& inner, const std::vector<Point>& outer) {
     double worst = -std::numeric_limits<double>::infinity();
     int facets = 0;
-    each_facet<N>(outer, [&](const std::array<int, N>&, const auto& plane) {
+    each_facet(outer, [&](const std::array<int, N>&, const auto& plane) {
         ++facets;
-        for (const Point<N>& p : inner) worst = std::max(worst, height<N>(plane, p));
+        for (const Point& p : inner) worst = std::max(worst, height(plane, p));
     });
     CHECK(facets > N);
     return worst;
 }
 
-template <int N>
-Mesh<N> simplex() {
-    Mesh<N> mesh;
-    mesh.points.assign(N + 1, Point<N>{});
+Mesh simplex() {
+    Mesh mesh;
+    mesh.points.assign(N + 1, Point{});
     for (int i = 0; i < N; ++i) mesh.points[i + 1][i] = 1;
     for (int skip = 0; skip <= N; ++skip) {
         std::array<int, N> facet;
@@ -142,24 +136,22 @@ Mesh<N> simplex() {
     return mesh;
 }
 
-template <int N>
 void encloses(int points, const std::vector<int>& targets) {
     for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-        const Mesh<N> mesh = random_hull<N>(seed, points);
+        const Mesh mesh = random_hull(seed, points);
         for (const int target : targets) {
-            const auto hull = progressive_hull_nd<N>(mesh.points, mesh.simplices, target, {});
+            const auto hull = progressive_hull_4d(mesh.points, mesh.simplices, target, {});
             CHECK_EQUAL(hull.size(), static_cast<std::size_t>(target));
-            CHECK(farthest_outside<N>(mesh.points, hull) < 1e-7);
+            CHECK(farthest_outside(mesh.points, hull) < 1e-7);
         }
     }
 }
 
-template <int N>
 void keeps_limits() {
     constexpr double margin = 0.01;
     double beyond = 0;
     for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-        const Mesh<N> mesh = random_hull<N>(seed, 14);
+        const Mesh mesh = random_hull(seed, 14);
         double low = 1, high = 0;
         for (const auto& p : mesh.points) {
             low = std::min(low, p[N - 1]);
@@ -168,33 +160,31 @@ void keeps_limits() {
         low -= margin;
         high += margin;
         // Not of unit length: a limit is a half-space, however it is written.
-        Limit<N> floor{}, ceiling{};
+        HalfSpace<4> floor{}, ceiling{};
         floor.a[N - 1] = 2;
         floor.b = 2 * low;
         ceiling.a[N - 1] = -3;
         ceiling.b = -3 * high;
-        for (const auto& p : progressive_hull_nd<N>(mesh.points, mesh.simplices, N + 3, {}))
+        for (const auto& p : progressive_hull_4d(mesh.points, mesh.simplices, N + 3, {}))
             beyond = std::max({beyond, low - p[N - 1], p[N - 1] - high});
-        const auto kept =
-            progressive_hull_nd<N>(mesh.points, mesh.simplices, N + 3, {floor, ceiling});
+        const auto kept = progressive_hull_4d(mesh.points, mesh.simplices, N + 3, {floor, ceiling});
         CHECK(kept.size() < mesh.points.size());
         for (const auto& p : kept) {
             CHECK(p[N - 1] > low - 1e-8);
             CHECK(p[N - 1] < high + 1e-8);
         }
-        CHECK(farthest_outside<N>(mesh.points, kept) < 1e-7);
+        CHECK(farthest_outside(mesh.points, kept) < 1e-7);
     }
     CHECK(beyond > margin);  // without limits they do not
 }
 
-template <int N>
 void refuses() {
-    const Mesh<N> mesh = simplex<N>();
-    const auto call = [](const Mesh<N>& m, const std::vector<Limit<N>>& limits) {
-        progressive_hull_nd<N>(m.points, m.simplices, 20, limits);
+    const Mesh mesh = simplex();
+    const auto call = [](const Mesh& m, const std::vector<HalfSpace<4>>& limits) {
+        progressive_hull_4d(m.points, m.simplices, 20, limits);
     };
     CHECK_THROWS(std::invalid_argument, call({}, {}));
-    Mesh<N> bad = mesh;
+    Mesh bad = mesh;
     bad.simplices.pop_back();
     CHECK_THROWS(std::invalid_argument, call(bad, {}));
     bad = mesh;
@@ -210,18 +200,17 @@ void refuses() {
         bad = mesh;
         bad.points[1][0] = number;
         CHECK_THROWS(std::invalid_argument, call(bad, {}));
-        CHECK_THROWS(std::invalid_argument, call(mesh, {Limit<N>{{}, number}}));
+        CHECK_THROWS(std::invalid_argument, call(mesh, {HalfSpace<4>{{}, number}}));
     }
 }
 
 /// A simplex with its last corner cut off at nine tenths: the cheapest hull around it is the whole.
-template <int N>
 void cut_corner_grows_back() {
-    Mesh<N> mesh;
-    const Mesh<N> whole = simplex<N>();
+    Mesh mesh;
+    const Mesh whole = simplex();
     mesh.points.assign(whole.points.begin(), whole.points.end() - 1);
     for (int i = 0; i < N; ++i) {
-        Point<N> p{};
+        Point p{};
         p[N - 1] = 0.9;
         if (i > 0) p[i - 1] = 0.1;
         mesh.points.push_back(p);
@@ -246,7 +235,7 @@ void cut_corner_grows_back() {
             mesh.simplices.push_back(facet);
         }
     }
-    const auto hull = progressive_hull_nd<N>(mesh.points, mesh.simplices, N + 1, {});
+    const auto hull = progressive_hull_4d(mesh.points, mesh.simplices, N + 1, {});
     CHECK_EQUAL(hull.size(), static_cast<std::size_t>(N + 1));
     for (const auto& corner : whole.points) {
         double nearest = std::numeric_limits<double>::infinity();
@@ -263,50 +252,38 @@ void cut_corner_grows_back() {
 
 TEST(a_simplex_stays_as_it_is) {
     for (const int target : {-5, 0, 5, 100}) {
-        const Mesh<4> mesh = simplex<4>();
-        const auto hull = progressive_hull_nd<4>(mesh.points, mesh.simplices, target, {});
+        const Mesh mesh = simplex();
+        const auto hull = progressive_hull_4d(mesh.points, mesh.simplices, target, {});
         CHECK_EQUAL(hull.size(), std::size_t{5});
         for (std::size_t i = 0; i < hull.size(); ++i)
             for (std::size_t c = 0; c < 4; ++c) CHECK_NEAR(hull[i][c], mesh.points[i][c], 1e-15);
     }
 }
 
-TEST(a_cut_corner_grows_back_in_4d) {
-    cut_corner_grows_back<2>();
-    cut_corner_grows_back<3>();
-    cut_corner_grows_back<4>();
-}
+TEST(a_cut_corner_grows_back_in_4d) { cut_corner_grows_back(); }
 
-TEST(hulls_enclose_their_points_with_as_many_vertices_as_asked) {
-    encloses<2>(16, {10, 5, 4});
-    encloses<3>(16, {12, 8, 6});
-    encloses<4>(16, {14, 11, 9});
-}
+TEST(hulls_enclose_their_points_with_as_many_vertices_as_asked) { encloses(16, {14, 11, 9}); }
 
-TEST(new_vertices_keep_their_limits) {
-    keeps_limits<2>();
-    keeps_limits<3>();
-    keeps_limits<4>();
-}
+TEST(new_vertices_keep_their_limits) { keeps_limits(); }
 
 TEST(a_limit_that_allows_nothing_leaves_the_hull_as_it_is) {
-    const Mesh<4> mesh = random_hull<4>(3, 12);
-    Limit<4> nowhere{};
+    const Mesh mesh = random_hull(3, 12);
+    HalfSpace<4> nowhere{};
     nowhere.a[0] = 1;
     nowhere.b = 100;
-    const auto hull = progressive_hull_nd<4>(mesh.points, mesh.simplices, 8, {nowhere});
+    const auto hull = progressive_hull_4d(mesh.points, mesh.simplices, 8, {nowhere});
     CHECK_EQUAL(hull.size(), mesh.points.size());
     for (std::size_t i = 0; i < hull.size(); ++i)
         for (std::size_t c = 0; c < 4; ++c) CHECK_NEAR(hull[i][c], mesh.points[i][c], 1e-14);
 }
 
 TEST(the_unit_of_an_axis_does_not_matter) {
-    const Mesh<4> mesh = random_hull<4>(5, 16);
-    const auto small = progressive_hull_nd<4>(mesh.points, mesh.simplices, 9, {});
-    std::vector<Point<4>> frames = mesh.points;
+    const Mesh mesh = random_hull(5, 16);
+    const auto small = progressive_hull_4d(mesh.points, mesh.simplices, 9, {});
+    std::vector<Point> frames = mesh.points;
     // A power of two, so that the numbers in a unit cube are the same to the last bit.
     for (auto& p : frames) p[3] *= 64;
-    const auto large = progressive_hull_nd<4>(frames, mesh.simplices, 9, {});
+    const auto large = progressive_hull_4d(frames, mesh.simplices, 9, {});
     CHECK_EQUAL(large.size(), small.size());
     for (std::size_t i = 0; i < std::min(small.size(), large.size()); ++i)
         for (std::size_t c = 0; c < 4; ++c)
@@ -314,17 +291,13 @@ TEST(the_unit_of_an_axis_does_not_matter) {
 }
 
 TEST(points_without_volume_end_without_a_crash) {
-    Mesh<4> mesh = random_hull<4>(2, 10);
+    Mesh mesh = random_hull(2, 10);
     for (auto& p : mesh.points) p[1] = 0.25;
-    for (const auto& p : progressive_hull_nd<4>(mesh.points, mesh.simplices, 6, {}))
+    for (const auto& p : progressive_hull_4d(mesh.points, mesh.simplices, 6, {}))
         for (const double x : p) CHECK(std::isfinite(x));
     for (auto& p : mesh.points) p.fill(0.5);
-    for (const auto& p : progressive_hull_nd<4>(mesh.points, mesh.simplices, 6, {}))
+    for (const auto& p : progressive_hull_4d(mesh.points, mesh.simplices, 6, {}))
         for (const double x : p) CHECK(std::isfinite(x));
 }
 
-TEST(bad_hulls_are_refused) {
-    refuses<2>();
-    refuses<3>();
-    refuses<4>();
-}
+TEST(bad_hulls_are_refused) { refuses(); }
