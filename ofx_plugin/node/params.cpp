@@ -80,82 +80,15 @@ std::string Params::media() const {
     return Properties(suites_, handle).get_string(kResolvePropSrcFilePath).value_or("");
 }
 
-std::optional<std::string> Params::string_at(const char* name, OfxTime time) const {
-    char* value = nullptr;
-    const OfxParamHandle param = find(name);
-    if (!param || !suite_->paramGetValueAtTime ||
-        suite_->paramGetValueAtTime(param, time, &value) != kOfxStatOK || !value) {
-        return std::nullopt;
-    }
-    return std::string(value);
+std::optional<std::string> Params::text(const char* name, const OfxTime* time) const {
+    const char* text = value<char*>(name, time).value_or(nullptr);
+    return text ? std::optional<std::string>(text) : std::nullopt;
 }
 
-std::optional<double> Params::double_at(const char* name, OfxTime time) const {
-    double value = 0;
-    const OfxParamHandle param = find(name);
-    if (!param || !suite_->paramGetValueAtTime ||
-        suite_->paramGetValueAtTime(param, time, &value) != kOfxStatOK) {
-        return std::nullopt;
-    }
-    return value;
-}
-
-std::optional<int> Params::int_at(const char* name, OfxTime time) const {
-    int value = 0;
-    const OfxParamHandle param = find(name);
-    if (!param || !suite_->paramGetValueAtTime ||
-        suite_->paramGetValueAtTime(param, time, &value) != kOfxStatOK) {
-        return std::nullopt;
-    }
-    return value;
-}
-
-std::optional<std::array<double, 3>> Params::rgb_at(const char* name, OfxTime time) const {
-    std::array<double, 3> value{};
-    const OfxParamHandle param = find(name);
-    if (!param || !suite_->paramGetValueAtTime ||
-        suite_->paramGetValueAtTime(param, time, &value[0], &value[1], &value[2]) != kOfxStatOK) {
-        return std::nullopt;
-    }
-    return value;
-}
-
-std::optional<std::string> Params::string_now(const char* name) const {
-    char* value = nullptr;
-    const OfxParamHandle param = find(name);
-    if (!param || !suite_->paramGetValue || suite_->paramGetValue(param, &value) != kOfxStatOK ||
-        !value) {
-        return std::nullopt;
-    }
-    return std::string(value);
-}
-
-std::optional<double> Params::double_now(const char* name) const {
-    double value = 0;
-    const OfxParamHandle param = find(name);
-    if (!param || !suite_->paramGetValue || suite_->paramGetValue(param, &value) != kOfxStatOK) {
-        return std::nullopt;
-    }
-    return value;
-}
-
-std::optional<int> Params::int_now(const char* name) const {
-    int value = 0;
-    const OfxParamHandle param = find(name);
-    if (!param || !suite_->paramGetValue || suite_->paramGetValue(param, &value) != kOfxStatOK) {
-        return std::nullopt;
-    }
-    return value;
-}
-
-std::optional<std::array<double, 3>> Params::rgb_now(const char* name) const {
-    std::array<double, 3> value{};
-    const OfxParamHandle param = find(name);
-    if (!param || !suite_->paramGetValue ||
-        suite_->paramGetValue(param, &value[0], &value[1], &value[2]) != kOfxStatOK) {
-        return std::nullopt;
-    }
-    return value;
+std::optional<std::array<double, 3>> Params::rgb(const char* name, const OfxTime* time) const {
+    std::array<double, 3> rgb{};
+    if (!read(name, time, &rgb[0], &rgb[1], &rgb[2])) return std::nullopt;
+    return rgb;
 }
 
 bool Params::animated(const char* name) const {

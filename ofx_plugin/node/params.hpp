@@ -33,16 +33,25 @@ public:
     Params& operator=(const Params&) = delete;
 
     /// With a time: allowed in every action.
-    std::optional<std::string> string_at(const char* name, OfxTime time) const;
-    std::optional<double> double_at(const char* name, OfxTime time) const;
+    std::optional<std::string> string_at(const char* name, OfxTime time) const {
+        return text(name, &time);
+    }
+    std::optional<double> double_at(const char* name, OfxTime time) const {
+        return value<double>(name, &time);
+    }
     /// Integers, choices (the option's index) and booleans (0 or 1).
-    std::optional<int> int_at(const char* name, OfxTime time) const;
-    std::optional<std::array<double, 3>> rgb_at(const char* name, OfxTime time) const;
+    std::optional<int> int_at(const char* name, OfxTime time) const {
+        return value<int>(name, &time);
+    }
+    std::optional<std::array<double, 3>> rgb_at(const char* name, OfxTime time) const {
+        return rgb(name, &time);
+    }
     /// Without a time: only in kOfxActionInstanceChanged, as ofxParam.h says.
-    std::optional<std::string> string_now(const char* name) const;
-    std::optional<double> double_now(const char* name) const;
-    std::optional<int> int_now(const char* name) const;
-    std::optional<std::array<double, 3>> rgb_now(const char* name) const;
+    std::optional<std::string> string_now(const char* name) const { return text(name, nullptr); }
+    std::optional<int> int_now(const char* name) const { return value<int>(name, nullptr); }
+    std::optional<std::array<double, 3>> rgb_now(const char* name) const {
+        return rgb(name, nullptr);
+    }
     /// Whether the parameter has keyframes.
     bool animated(const char* name) const;
     /// Makes all later changes one undo step, which ends with this object. Without changes there is
@@ -62,6 +71,24 @@ public:
     std::string media() const;
 
 private:
+    /// The parameter's value at a time, or now (null); false where the host refuses.
+    template <typename... Values>
+    bool read(const char* name, const OfxTime* time, Values*... values) const {
+        const OfxParamHandle param = find(name);
+        if (!param) return false;
+        if (time) {
+            return suite_->paramGetValueAtTime &&
+                   suite_->paramGetValueAtTime(param, *time, values...) == kOfxStatOK;
+        }
+        return suite_->paramGetValue && suite_->paramGetValue(param, values...) == kOfxStatOK;
+    }
+    template <typename Value>
+    std::optional<Value> value(const char* name, const OfxTime* time) const {
+        Value value{};
+        return read(name, time, &value) ? std::optional<Value>(value) : std::nullopt;
+    }
+    std::optional<std::string> text(const char* name, const OfxTime* time) const;
+    std::optional<std::array<double, 3>> rgb(const char* name, const OfxTime* time) const;
     OfxParamHandle find(const char* name) const;
     void begin_step() const;
 
