@@ -135,7 +135,7 @@ class Banner(QFrame):
         """Keep the error that was said; why there is no picture stands here already."""
         status = self.session.status
         if status.level == "error" and status.text != self.viewer.problem:
-            save = status.text.startswith(texts.NOT_SAVED)
+            save = status.code == "not saved"
             remedies = self._elsewhere if save else {}
             self.tell("save" if save else "error", status.text, "error", remedies)
 

@@ -397,7 +397,7 @@ class Session(Drafts):
             kept = texts.KEPT_IN.format(copy=copy)
         except (Palette4dError, OSError):
             kept = texts.KEPT_HERE
-        self.say(f"{texts.NOT_SAVED} {in_words(error)}. {kept}", "error")
+        self.say(f"{texts.NOT_SAVED} {in_words(error)}. {kept}", "error", "not saved")
 
     @staticmethod
     def _elsewhere(document: Document) -> Document:

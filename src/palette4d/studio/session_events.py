@@ -7,7 +7,7 @@ from palette4d.common.errors import Palette4dError, in_words
 from palette4d.grade.clip_of_picks import OWN_CLIP
 from palette4d.media.clip_base import LEAVE_OUT
 from palette4d.studio import texts
-from palette4d.studio.states import Level, Status
+from palette4d.studio.states import Code, Level, Status
 
 #: The advice of the API, and the window's.
 ADVICE = {LEAVE_OUT: texts.BAD_FRAME, OWN_CLIP: texts.OWN_CLIP}
@@ -85,9 +85,9 @@ class Events:
             elif not dragged or follows():
                 self.later(callback)
 
-    def say(self, text: str, level: Level = "info") -> None:
+    def say(self, text: str, level: Level = "info", code: Code = "") -> None:
         """Set the status."""
-        self.status = Status(text, level)
+        self.status = Status(text, level, code)
         self.emit("status")
 
     def report(self, error: Exception) -> None:

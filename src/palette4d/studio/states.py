@@ -4,6 +4,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 Level = Literal["info", "warning", "error"]
+#: Errors that have a remedy in the banner.
+Code = Literal["", "not saved"]
 
 
 @dataclass(frozen=True)
@@ -12,6 +14,7 @@ class Status:
 
     text: str = ""
     level: Level = "info"
+    code: Code = ""
 
 
 @dataclass(frozen=True)
