@@ -231,7 +231,7 @@ def draw_timelines(sidecars: Sequence[tuple[str, Path]], output: Path, width: in
             axes.text(margin, top - 18, title, fontsize=10, color=style.BRIGHT, va="center")
             panel.top = top - room
             top = panel.bottom
-            timeline.draw(axes, panel, str(sidecar.clip["encoding"]))
+            timeline.draw(axes, panel, str(sidecar.clip["encoding"]), {}, {})
         figure.savefig(output, dpi=width / (points / 72), facecolor=style.PAGE)
     say(f"wrote {output}")
 
