@@ -33,7 +33,7 @@ from palette4d.lut_export.measured_write import BakeSettings
 from palette4d.lut_export.spaces import PALETTE
 
 from palette4d import _core
-from palette4d.colour.ocio_config import BUILT_IN, failures
+from palette4d.colour.ocio_config import BUILT_IN, config_of, failures
 from palette4d.common import sandbox
 from palette4d.common.child import Child
 from palette4d.common.errors import Arg, Palette4dError
@@ -114,8 +114,6 @@ def write_config(
         Nothing was written; or only LUTs, if a frame could not be baked or OpenColorIO refuses the
         config.
     """
-    import PyOpenColorIO as ocio
-
     path = folder / "config.ocio"
     if folder.is_dir():
         refuse_existing(path, force)
@@ -154,7 +152,7 @@ def write_config(
     with replacing(path, force=force) as temporary:
         temporary.write_text(config.serialize(), encoding="utf-8", newline="\n")
         try:
-            _validate(ocio.Config.CreateFromFile(str(temporary)), shots, views)
+            _validate(config_of(temporary), shots, views)
         except failures() as error:
             raise Palette4dError(
                 f"{path}: OpenColorIO refuses the config: {error}; only the LUTs were written. "

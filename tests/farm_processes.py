@@ -24,6 +24,10 @@ def wait_for(what: Callable[[], object], why: str) -> None:
 
 def running(pid: int) -> bool:
     """Whether a process runs; one that ended may stay in the list until somebody asks for it."""
+    if sys.platform == "win32":
+        from palette4d.common.windows import has_ended
+
+        return not has_ended(pid)
     try:
         os.kill(pid, 0)
         return ") Z " not in Path(f"/proc/{pid}/stat").read_text()

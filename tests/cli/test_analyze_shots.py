@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.resources
 import json
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -543,6 +542,7 @@ class TestRefusals:
     def test_a_full_disk(self, edit: Path, tmp_path: Path) -> None:
         """Files of more than 2,500 bytes cannot be written, as sidecars are."""
         out = tmp_path / "shots"
+        resource = pytest.importorskip("resource")
         words = [sys.executable, "-m", "palette4d", "analyze", str(edit), "-o", str(out)]
         done = subprocess.run(
             [*words, "--jobs", "1", "--quiet", *QUICK],

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import subprocess
 import sys
 from fractions import Fraction
@@ -117,6 +116,7 @@ class TestPiping:
 class TestFiles:
     def test_a_disk_that_is_full_midway(self, tmp_path: Path) -> None:
         """Files of this process may not grow beyond 50 kB."""
+        resource = pytest.importorskip("resource")
         out = tmp_path / "a.clf"
         out.write_text("mine", "utf-8")
         done = command(

@@ -5,10 +5,8 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import pty
 import subprocess
 import sys
-import termios
 from pathlib import Path
 
 import pytest
@@ -107,6 +105,7 @@ class TestExport:
 
 def on_terminal(*words: object) -> list[str]:
     """Return the lines that a terminal shows of a command's standard error."""
+    pty, termios = pytest.importorskip("pty"), pytest.importorskip("termios")
     terminal, error = pty.openpty()
     termios.tcsetwinsize(error, (25, 200))
     command = [sys.executable, "-m", "palette4d", *map(str, words)]

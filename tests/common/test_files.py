@@ -1,7 +1,6 @@
 """The atomic writer: whatever happens, a reader finds the old file or the new one."""
 
 import errno
-import fcntl
 import os
 import secrets
 import stat
@@ -108,31 +107,6 @@ def test_file_and_folder_are_synced(old: Path, monkeypatch: pytest.MonkeyPatch) 
     with replacing(old, force=True) as temporary:
         temporary.write_bytes(b"new")
     assert events == ["file", "rename", "folder"]
-
-
-@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="lists this process's open files")
-def test_windows_renames_closed_files_and_waits_for_a_reader(
-    old: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    rename, refusals = Path.replace, [PermissionError(13, "in use")] * 2
-
-    def windows(self: Path, target: Path) -> Path:
-        assert not any(
-            handle.samefile(self) for handle in Path("/proc/self/fd").iterdir() if handle.exists()
-        )
-        if refusals:
-            raise refusals.pop()
-        return rename(self, target)
-
-    monkeypatch.setattr(Path, "replace", windows)
-    monkeypatch.setattr(files.sys, "platform", "win32")
-    replace(old, lambda: None)
-    assert old.read_bytes() == b"new"
-    refusals += [PermissionError(13, "in use")] * 100
-    monkeypatch.setattr(files.time, "sleep", lambda _: None)
-    with pytest.raises(WriteError, match="in use"):
-        replace(old, lambda: None)
-    assert names(old.parent) == [old.name]
 
 
 @pytest.mark.parametrize("mode", [0o640, 0o600, 0o444])
@@ -400,6 +374,7 @@ def test_files_that_are_being_written_are_no_leftovers(
 
 def test_nobody_waits_for_a_lock_on_a_new_file(old: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Another user sees the new file first, and keeps a lock on it."""
+    fcntl = pytest.importorskip("fcntl")
     real, kept = os.open, []
 
     def opened(path: Path, flags: int, *mode: int) -> int:
@@ -439,6 +414,7 @@ def test_a_new_folder_that_another_process_removes_is_made_again(
 def test_without_locks_only_old_files_are_leftovers(
     old: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    fcntl = pytest.importorskip("fcntl")
     monkeypatch.setattr(fcntl, "flock", failing(OSError(errno.ENOLCK, "no locks")))
     fresh, stale = (old.with_name(f".a.{digit * 16}.p4d-tmp.cube") for digit in "01")
     fresh.touch()

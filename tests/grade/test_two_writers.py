@@ -1,6 +1,5 @@
 """Several processes edit one sidecar at once; no acknowledged edit is lost."""
 
-import fcntl
 import itertools
 import json
 import os
@@ -140,6 +139,7 @@ def test_a_lock_file_of_a_dead_process_is_removed(
 
 
 def test_who_may_only_read_a_folder_cannot_hold_up_a_save(tmp_path: Path) -> None:
+    fcntl = pytest.importorskip("fcntl")
     edited = tmp_path / "clip.p4d.json"
     edited.write_bytes((GOLDEN / "v1_split.p4d.json").read_bytes())
     handle = os.open(edited.parent, os.O_RDONLY)

@@ -67,9 +67,17 @@ def test_folders_follow_the_environment(home: Path, monkeypatch: pytest.MonkeyPa
     assert data_folder("kdenlive", "linux") == Path.home() / ".local/share/kdenlive/effects"
 
 
-def test_other_platforms_must_name_the_folder() -> None:
-    with pytest.raises(Palette4dError, match=r"darwin.*kdenlive=…"):
-        data_folder("kdenlive", "darwin")
+def test_folders_of_other_systems(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    filters = "Meltytech/Shotcut/extensions/filters"
+    monkeypatch.setenv("APPDATA", str(tmp_path / "Roaming"))
+    monkeypatch.setenv("LOCALAPPDATA", str(tmp_path / "Local"))
+    assert data_folder("kdenlive", "win32") == tmp_path / "Roaming/kdenlive/effects"
+    assert data_folder("shotcut", "win32") == tmp_path / "Local" / filters
+    monkeypatch.delenv("LOCALAPPDATA")
+    assert data_folder("shotcut", "win32") == Path.home() / "AppData/Local" / filters
+    support = Path.home() / "Library/Application Support"
+    assert data_folder("kdenlive", "darwin") == support / "kdenlive/effects"
+    assert data_folder("shotcut", "darwin") == support / filters
 
 
 def test_writes_the_files_and_nothing_else(tmp_path: Path) -> None:

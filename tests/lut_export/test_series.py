@@ -6,7 +6,6 @@ import hashlib
 import itertools
 import json
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -252,6 +251,7 @@ if __name__ == "__main__":
 
 def test_a_disk_that_fills_up_ends_it_at_once(tmp_path: Path) -> None:
     """From the first frame on this process may write small files only; its workers may not know."""
+    resource = pytest.importorskip("resource")
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     told: list[int] = []
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -70,3 +72,19 @@ def test_what_is_no_event_is_a_message(tmp_path: Path) -> None:
         assert job.messages == line.decode()
     job._take(b'{"stage": "x", "done": 9, "total": 3}\n')
     assert job.fraction == 1
+
+
+def test_a_verb_stops_when_its_input_ends(tmp_path: Path, analysed: Path) -> None:
+    """As Studio stops it on Windows, where nobody sends Ctrl-C to another console."""
+    out = tmp_path / "stopped.p4d.json"
+    words = ["analyze", "--stop-at-eof", str(analysed / "clip"), "-o", str(out)]
+    with subprocess.Popen(
+        [sys.executable, "-m", "palette4d", *words],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+    ) as process:
+        assert process.stdin is not None
+        process.stdin.close()
+        assert process.wait(60) == 130
+    assert not out.exists()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import shlex
 import time
 from fractions import Fraction
 from pathlib import Path
@@ -18,7 +17,7 @@ from palette4d.cli.reading import add_reading, clip_name
 from palette4d.cli.terminal import option_of, tell
 from palette4d.common.arguments import checked, frame_range, whole
 from palette4d.common.errors import Palette4dError
-from palette4d.common.text import counted
+from palette4d.common.text import counted, quoted
 
 USAGE = "palette4d analyze CLIP -o OUT [options]"
 
@@ -232,10 +231,10 @@ def run(args: argparse.Namespace) -> int:
         colours = counted(len(document.grade.tracks), "palette colour")
         handles = counted(len(document.fields()["polytope"]["vertices"]), "handle")
         print(f"wrote {args.output}: {colours} through time, {handles}")
-        out = shlex.quote(str(args.output))
+        out = quoted(args.output)
         print(f"next: palette4d plot {out} -o palette.png")
         if args.like is not None and load(args.like).grade.edited and not document.grade.edited:
-            print(f"      palette4d edit {out} copy {shlex.quote(str(args.like))}")
+            print(f"      palette4d edit {out} copy {quoted(args.like)}")
     return 0
 
 

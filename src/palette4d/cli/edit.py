@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import functools
-import shlex
 import textwrap
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +12,7 @@ from palette4d.cli import edit_copy, edit_history, picks
 from palette4d.cli.swatches import shown
 from palette4d.common.arguments import ColourAction, accept_negative_values, number
 from palette4d.common.errors import Palette4dError
+from palette4d.common.text import quoted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -296,7 +296,7 @@ def run_set(args: argparse.Namespace) -> int:
     if (args.near is None) == (args.id is None):
         raise Palette4dError(
             f"found {'ID and --near' if args.id else 'no ID and no --near'}, expected one of them; "
-            f"`palette4d info {shlex.quote(args.sidecar)}` lists the ids"
+            f"`palette4d info {quoted(args.sidecar)}` lists the ids"
         )
     if args.near is None:
         return run_adjust(args)

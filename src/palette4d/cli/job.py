@@ -13,7 +13,10 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
+import signal
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
@@ -40,6 +43,22 @@ def events_to(path: str | None) -> Iterator[None]:
             yield
         finally:
             stream = None
+
+
+def stop_at_end_of_input() -> None:
+    """Do as on Ctrl-C when the program that waits closes its end of our input, or has ended."""
+    # A process that starts meanwhile would wait for the thread that reads its input.
+    theirs, nothing = os.dup(0), os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+
+    def wait() -> None:
+        with contextlib.suppress(OSError):
+            while os.read(theirs, 4096):
+                pass
+        signal.raise_signal(signal.SIGINT)
+
+    threading.Thread(target=wait, name="palette4d input", daemon=True).start()
 
 
 def shown(text: str) -> str:

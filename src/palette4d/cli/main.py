@@ -8,7 +8,6 @@ import argparse
 import contextlib
 import importlib
 import os
-import signal
 import sys
 from collections.abc import Callable, Sequence
 
@@ -66,6 +65,7 @@ def build_parser(verb: str = "") -> argparse.ArgumentParser:
         importlib.import_module(name).add_parser(subparsers)
     for each in subparsers.choices.values():
         each.add_argument("--progress", metavar="FILE", help=argparse.SUPPRESS)
+        each.add_argument("--stop-at-eof", action="store_true", help=argparse.SUPPRESS)
         each.add_argument(
             "--sandbox", choices=("auto", "on", "off"), default="auto", help=argparse.SUPPRESS
         )
@@ -86,8 +86,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     # All loops run in threads of palette4d's own. Those of OpenBLAS would only spin beside them,
     # and would not be confined.
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    if sys.platform == "win32":  # what Studio sends in the place of Ctrl-C
-        signal.signal(signal.SIGBREAK, signal.default_int_handler)
     given = sys.argv[1:] if argv is None else argv
     with printable_output(), contextlib.ExitStack() as stack:
         args = build_parser(*given[:1]).parse_args(given)
@@ -99,6 +97,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(args: argparse.Namespace, stack: contextlib.ExitStack) -> int:
     run: Callable[[argparse.Namespace], int] = args.run
     try:
+        if args.stop_at_eof:
+            job.stop_at_end_of_input()
         stack.enter_context(job.events_to(args.progress))
         if args.confine:
             stack.enter_context(confined(args))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import io
 import sys
 from collections.abc import Iterator
 from typing import Any, TextIO
@@ -16,6 +17,9 @@ from palette4d.cli import job, swatches
 from palette4d.common.message import Arg, Message
 from palette4d.common.text import printable
 from palette4d.studio import texts
+
+if sys.platform == "win32":
+    from palette4d.common import windows
 
 
 class _Printable:
@@ -44,9 +48,20 @@ def unfiltered_stderr() -> TextIO:
 @contextlib.contextmanager
 def printable_output() -> Iterator[None]:
     """Make standard output and standard error printable in the body (`common.text.printable`)."""
-    streams: Any = (_Printable(sys.stdout), _Printable(sys.stderr))
-    with contextlib.redirect_stdout(streams[0]), contextlib.redirect_stderr(streams[1]):
-        yield
+    for stream in (sys.stdout, sys.stderr):
+        # Files and pipes have the code page of Windows, which lacks most characters.
+        if sys.platform == "win32" and isinstance(stream, io.TextIOWrapper):
+            encoding = stream.encoding if stream.isatty() else "utf-8"
+            stream.reconfigure(encoding=encoding, errors="backslashreplace")
+    # Windows' pythonw, which starts the window without a console, has neither.
+    unseen = io.StringIO()
+    streams: Any = (_Printable(sys.stdout or io.StringIO()), _Printable(sys.stderr or unseen))
+    try:
+        with contextlib.redirect_stdout(streams[0]), contextlib.redirect_stderr(streams[1]):
+            yield
+    finally:
+        if sys.platform == "win32" and unseen.getvalue():
+            windows.show_error(unseen.getvalue())
 
 
 def option_of(arg: Arg, parser: argparse.ArgumentParser) -> str:

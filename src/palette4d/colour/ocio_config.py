@@ -90,6 +90,23 @@ def _log_through_python() -> None:
     atexit.register(ocio.ResetToDefaultLoggingFunction)
 
 
+def config_of(path: Path) -> Any:
+    """Return the config in a file, as OpenColorIO reads it."""
+    import PyOpenColorIO as ocio
+
+    if sys.platform != "win32" or str(path.absolute()).isascii():
+        return ocio.Config.CreateFromFile(str(path))
+    # There OpenColorIO takes the name of a config, and no other, for one of the code page.
+    if path.suffix.lower() == ".ocioz":
+        raise Palette4dError(
+            f"{path}: OpenColorIO opens such archives on Windows in folders with ASCII names only; "
+            "move it to one, such as C:\\ocio"
+        )
+    config = ocio.Config.CreateFromStream(path.read_text(encoding="utf-8", errors="replace"))
+    config.setWorkingDir(str(path.absolute().parent))
+    return config
+
+
 def load_config(name: str, option: str) -> Any:
     """Return a config.ocio, an .ocioz archive, or a built-in ``ocio://`` config.
 
@@ -114,7 +131,7 @@ def load_config(name: str, option: str) -> Any:
             f"built-in ocio:// name with {option}"
         )
     try:
-        config = ocio.Config.CreateFromFile(name)
+        config = config_of(Path(name))
         config.validate()
     except failures() as error:
         raise Palette4dError(
@@ -135,10 +152,8 @@ def files_of_config(name: str) -> list[Path]:
         return []
     folder = Path(name).absolute().parent
     found = [Path(name), *sandbox.parts(folder, _LUTS)]
-    with contextlib.suppress(*failures()):
-        import PyOpenColorIO as ocio
-
-        config = ocio.Config.CreateFromFile(name)
+    with contextlib.suppress(*failures(), Palette4dError):
+        config = config_of(Path(name))
         context = config.getCurrentContext()
         for path in config.getSearchPaths():
             found += sandbox.parts(folder / context.resolveStringVar(path), _LUTS)

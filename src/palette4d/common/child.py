@@ -24,6 +24,9 @@ from typing import Any, TypeVar
 from palette4d.common import files, sandbox
 from palette4d.common.errors import Palette4dError, in_words
 
+if sys.platform == "win32":
+    from palette4d.common import windows
+
 Result = TypeVar("Result")
 
 #: Seconds in which a process that has closed its pipe may end.
@@ -42,7 +45,7 @@ class Child:
     seconds : float, optional
         The longest time for a call.
     megabytes : int, optional
-        The most memory for all calls, where the system can limit it.
+        The most memory for all calls, where the system can limit it: macOS cannot.
     reads : iterable of Path, optional
         The process is confined (`sandbox`), if that is wanted: it reads these, and writes into a
         folder for temporary files alone.
@@ -56,7 +59,7 @@ class Child:
     ) -> None:
         self.seconds, self.megabytes = seconds, megabytes
         self._reads = None if reads is None or not sandbox.wanted() else list(reads)
-        self._temporary = contextlib.ExitStack()
+        self._own = contextlib.ExitStack()
         self._process: Any = None
         self._pipe: Connection | None = None
 
@@ -136,7 +139,7 @@ class Child:
         if self._pipe is not None:
             self._pipe.close()
         self._process = self._pipe = None
-        self._temporary.close()
+        self._own.close()
 
     def _start(self) -> None:
         # Spawned, not forked: the libraries run threads, which a fork would break.
@@ -153,17 +156,19 @@ class Child:
             confined = None
             if self._reads is not None:
                 folder = files.temporary_folder(Path(tempfile.gettempdir()))
-                confined = self._reads, self._temporary.enter_context(folder)
+                confined = self._reads, self._own.enter_context(folder)
             arguments = (theirs, self.seconds, self.megabytes, confined)
             self._process = context.Process(target=_serve, args=arguments, daemon=True)
             self._process.start()
             theirs.close()
+        if sys.platform == "win32":  # before it gets its first call
+            self._own.enter_context(windows.limited(self._process.sentinel, self.megabytes))
 
 
 def done(children: Iterable[Child]) -> list[Child]:
     """Wait until calls that were begun have ended; return the children of these."""
-    pipes = {child._pipe: child for child in children if child._pipe is not None}
-    return [pipes[pipe] for pipe in wait(list(pipes)) if isinstance(pipe, Connection)]
+    pipes: dict[Any, Child] = {child._pipe: child for child in children if child._pipe is not None}
+    return [pipes[pipe] for pipe in wait(list(pipes))]
 
 
 @contextlib.contextmanager
@@ -242,10 +247,10 @@ def _serve(
 
 
 def _limit(megabytes: int) -> None:
-    try:
-        import resource
-    except ImportError:  # Windows
+    if sys.platform == "win32":  # the parent limits it
         return
+    import resource
+
     limits = ((resource.RLIMIT_AS, megabytes << 20), (resource.RLIMIT_CORE, 0))
     for kind, most in limits:
         # macOS does not limit memory.
@@ -257,4 +262,5 @@ def _cause(status: int | None) -> str:
     if status is not None and status < 0:
         with contextlib.suppress(ValueError):
             return signal.Signals(-status).name
-    return f"exit status {status}"
+    # Those of Windows are known by their digits: 0xc0000005 is a bad address.
+    return f"exit status {status if status is None or status < 256 else hex(status)}"

@@ -16,7 +16,9 @@ from palette4d.common import locking
 from palette4d.common.errors import Arg, Palette4dError, WriteError
 from palette4d.common.locking import remove_left_over
 
-if sys.platform != "win32":
+if sys.platform == "win32":
+    from palette4d.common import windows
+else:
     import fcntl
 
 #: What is said of an output file that exists.
@@ -233,15 +235,31 @@ def _new_temporary(path: Path) -> tuple[Path, int | None]:
 
 
 def _rename(temporary: Path, path: Path) -> None:
-    """Replace `path`. Windows refuses while a program has it open, as the node has for a moment."""
-    for left in reversed(range(40 if sys.platform == "win32" else 1)):
-        try:
-            temporary.replace(path)
-            return
-        except PermissionError:
-            if not left:
-                raise
-            time.sleep(0.05)
+    """Replace `path`. Windows refuses while a program has it open, as a reader has for a moment."""
+    if sys.platform != "win32":
+        temporary.replace(path)
+    else:
+        for left in reversed(range(40)):
+            try:
+                temporary.replace(path)
+                return
+            except PermissionError as error:
+                if path.exists() and not os.access(path, os.W_OK):
+                    raise WriteError(
+                        f"{path}: found a read-only file, which Windows does not replace; "
+                        f'run attrib -r "{path}", or choose another name'
+                    ) from error
+                if not left:
+                    raise _held(path, ", ".join(windows.holders(path))) from error
+                time.sleep(0.05)
+
+
+def _held(path: Path, who: str) -> WriteError:
+    """Return the error for a file that Windows does not replace."""
+    return WriteError(
+        f"{path}: found it open in {who or 'another program'}, and Windows replaces no open file; "
+        "close it there and try again, or choose another name"
+    )
 
 
 def _copy_permissions(path: Path, handle: int) -> None:
@@ -305,6 +323,8 @@ def _is_left_over(entry: os.DirEntry[str]) -> bool:
     """Whether no process uses a temporary file any more: its lock ends with the process."""
     if entry.is_symlink():
         return True
+    if sys.platform == "win32":
+        return time.time() - entry.stat().st_mtime > _LEFT_OVER_AFTER
     access = os.O_RDONLY if entry.is_dir() else os.O_RDWR
     handle = os.open(entry.path, access | getattr(os, "O_NOFOLLOW", 0))
     try:

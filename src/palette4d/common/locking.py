@@ -20,6 +20,9 @@ from typing import Any
 from palette4d.common.errors import Palette4dError
 from palette4d.common.json_files import UnusableFile, read_regular
 
+if sys.platform == "win32":
+    from palette4d.common import windows
+
 #: Locks and writes for this process, where it is confined (`common.writer`).
 delegate: Any = None
 
@@ -52,6 +55,8 @@ def locked(target: Path) -> Iterator[Callable[[], None]]:
         if owner is not None and (_is_dead(owner) or _is_unfinished(path, owner)):
             _remove(path, owner)
         elif time.monotonic() > deadline:
+            if owner is None and not path.exists():
+                raise _cannot(path)
             raise Palette4dError(
                 f"{target}: another program ({owner or 'unknown'}) has held {path} for "
                 f"{LOCK_SECONDS:g} seconds; wait for it to finish. If it no longer runs, remove "
@@ -69,9 +74,20 @@ def locked(target: Path) -> Iterator[Callable[[], None]]:
     try:
         yield held
     finally:
-        if _content(path) == mine:
-            with contextlib.suppress(OSError):
-                path.unlink(missing_ok=True)
+        _let_go(path, mine)
+
+
+def _let_go(path: Path, mine: str) -> None:
+    """Remove the own lock file. Windows refuses while another program reads who holds it."""
+    for _ in range(100 if sys.platform == "win32" else 1):
+        # One that cannot be read now is still ours: nobody takes away a running program's.
+        if _content(path) not in (mine, None):
+            return
+        try:
+            path.unlink(missing_ok=True)
+            return
+        except OSError:
+            time.sleep(random.uniform(0.002, 0.02))
 
 
 def remove_left_over(path: Path) -> None:
@@ -129,8 +145,10 @@ def _is_dead(owner: str) -> bool:
     """Whether the owner ran on this computer and has ended."""
     computer, _, rest = owner.partition(" ")
     pid = rest.partition(" ")[0]
-    if computer != _computer() or not pid.isdigit() or sys.platform == "win32":
+    if computer != _computer() or not pid.isdigit():
         return False
+    if sys.platform == "win32":  # there os.kill() ends a process, whatever the signal
+        return windows.has_ended(int(pid))
     try:
         os.kill(int(pid), 0)
     except ProcessLookupError:

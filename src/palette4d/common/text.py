@@ -1,6 +1,8 @@
 """Counts in messages, text for terminals, and safe file names."""
 
 import re
+import shlex
+import sys
 import unicodedata
 from collections.abc import Sequence
 from typing import Any
@@ -43,6 +45,14 @@ def printable(text: str) -> str:
     red \\u001b[31m
     """
     return _ACTIVE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+def quoted(word: object) -> str:
+    """Return a word as the system's shell takes it in a command."""
+    if sys.platform != "win32":
+        return shlex.quote(str(word))
+    # As cmd and PowerShell take it; no name of a file has such quotes.
+    return str(word) if re.fullmatch(r"[\w.:\\/#=+-]+", str(word)) else f'"{word}"'
 
 
 def on_lines(value: Any) -> Any:

@@ -5,28 +5,18 @@ import sys
 from pathlib import Path
 
 from palette4d._core import __version__
+from palette4d.common import folders
 from palette4d.common.errors import Arg, Palette4dError
 from palette4d.common.files import make_folder, replacing
 from palette4d.hosts import MARK, kdenlive, shotcut
 
 
 def data_folder(program: str, platform: str = sys.platform) -> Path:
-    """Return the user's folder from which "kdenlive" or "shotcut" loads effects or filters.
-
-    Platforms other than Linux are untested: there the user has to name the folder.
-    """
-    below = {
-        "kdenlive": "kdenlive/effects",
-        "shotcut": "Meltytech/Shotcut/extensions/filters",
-    }[program]
-    if platform != "linux":
-        raise Palette4dError(
-            f"found the platform {platform}, expected linux: the folder {below} of the program's "
-            f"data is not known here; name it with {Arg(program)}"
-        )
-    # The XDG standard requires programs to ignore relative folders.
-    home = Path(os.environ.get("XDG_DATA_HOME", ""))
-    return (home if home.is_absolute() else Path.home() / ".local/share") / below
+    """Return the user's folder from which "kdenlive" or "shotcut" loads effects or filters."""
+    if program == "kdenlive":  # Qt's AppDataLocation
+        return folders.data_folder(platform, roaming=True) / "kdenlive/effects"
+    # Qt's AppLocalDataLocation
+    return folders.data_folder(platform) / "Meltytech/Shotcut/extensions/filters"
 
 
 def install_kdenlive(folder: Path, *, force: bool = False) -> list[Path]:

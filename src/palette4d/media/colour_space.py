@@ -98,7 +98,7 @@ def _input_space(clip: Clip, options: SpaceOptions, config: Any, config_name: st
     if options.input_space is not None:
         given = options.input_space
         return colour_space(config, config_name, given, Arg("input_space", given))
-    path = str(clip.file(clip.frames[0]))
+    path = clip.file(clip.frames[0]).as_posix()  # rules of configs have slashes on every system
     if not config.filepathOnlyMatchesDefaultRule(path):
         name, _ = config.getColorSpaceFromFilepath(path)
         return colour_space(config, config_name, name, f"a file rule for {path}: {name!r}")

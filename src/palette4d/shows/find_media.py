@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 import urllib.parse
 import urllib.request
 from collections.abc import Iterable, Iterator
@@ -34,7 +35,9 @@ def local_path(url: str) -> Path:
     if parts.scheme == "":
         return Path(url)
     if parts.scheme == "file":
-        return Path(urllib.request.url2pathname(parts.path))
+        path = urllib.request.url2pathname(parts.path)
+        server = sys.platform == "win32" and parts.netloc not in ("", "localhost")
+        return Path(rf"\\{parts.netloc}{path}" if server else path)
     raise Palette4dError(
         f"found the media {url!r}, expected a file; relink it, or name its folder with "
         f"{Arg('media')}"
@@ -42,9 +45,11 @@ def local_path(url: str) -> Path:
 
 
 def is_elsewhere(url: str) -> bool:
-    """Whether a file:// URL names another computer."""
+    """Whether a file:// URL names another computer. Windows reads the files of these."""
     parts = urllib.parse.urlsplit(url)
-    return parts.scheme == "file" and parts.netloc not in ("", "localhost")
+    return (
+        sys.platform != "win32" and parts.scheme == "file" and parts.netloc not in ("", "localhost")
+    )
 
 
 class Folder:

@@ -5,7 +5,6 @@ A child's crash is a message in the window, not its end. Its command line can be
 
 import contextlib
 import os
-import shlex
 import signal
 import subprocess
 import sys
@@ -14,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import IO, Any
 
 from palette4d.common.json_files import parse
+from palette4d.common.text import quoted
 
 #: Python's options for a child: no module of the working folder, and UTF-8 on every system.
 PALETTE4D = ("-P", "-Xutf8", "-m", "palette4d")
@@ -27,7 +27,7 @@ LONGEST = 1 << 16
 
 def command_line(words: Sequence[str]) -> str:
     """Return the command as a user types it."""
-    return shlex.join(["palette4d", *words])
+    return " ".join(["palette4d", *map(quoted, words)])
 
 
 class Job:
@@ -62,15 +62,17 @@ class Job:
         self.status: int | None = None
         self.cancelled = False
         self._changed = changed
-        # A group of its own, which is stopped as a whole.
-        windows = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
+        windows = sys.platform == "win32"
+        # Windows sends Ctrl-C within a console only: there the child watches its input's end.
+        how = ["--progress", "-", *["--stop-at-eof"] * windows]
         self._process = subprocess.Popen(
-            [sys.executable, *PALETTE4D, *words[:1], "--progress", "-", *words[1:]],
-            stdin=subprocess.DEVNULL,
+            [sys.executable, *PALETTE4D, *words[:1], *how, *words[1:]],
+            stdin=subprocess.PIPE if windows else subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
+            # A group of its own, which is stopped as a whole.
             start_new_session=not windows,
-            creationflags=windows,
+            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
         )
         self._events = threading.Thread(target=self._read_events, name="palette4d job", daemon=True)
         self._events.start()
@@ -92,7 +94,8 @@ class Job:
             if sys.platform != "win32":
                 os.killpg(self._process.pid, signal.Signals[name])
             elif name == "SIGINT":
-                self._process.send_signal(signal.CTRL_BREAK_EVENT)
+                assert self._process.stdin is not None
+                self._process.stdin.close()
             else:
                 self._process.kill()
 

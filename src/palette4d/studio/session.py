@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from palette4d.common.errors import Palette4dError, in_words
+from palette4d.common.folders import state_folder
 from palette4d.grade import edits
 from palette4d.grade.document import Document, OfClip
 from palette4d.grade.edits import Edit as Step
@@ -449,11 +450,10 @@ class Session(Drafts):
 
 def recovery_files(sidecar: Path) -> Iterator[Path]:
     """Yield where edits are kept when the sidecar cannot be written: each session takes another."""
-    state = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
     name = hashlib.sha256(os.path.realpath(sidecar).encode()).hexdigest()[:12]
-    folder = Path(state) / "palette4d" / "recovery"
+    folder = state_folder() / "palette4d" / "recovery"
     # At most 255 bytes: two names may begin alike, their hashes do not.
-    short = os.fsdecode(os.fsencode(sidecar.name)[-200:])
+    short = os.fsencode(sidecar.name)[-200:].decode("utf-8", "ignore")
     return (folder / f"{name}-{number}-{short}" for number in itertools.count(1))
 
 
