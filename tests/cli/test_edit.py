@@ -373,11 +373,13 @@ def test_a_track_and_the_palette(plain: str, capsys: pytest.CaptureFixture[str])
 
 def test_ramps(plain: str) -> None:
     assert run(plain, "ramp smooth") == 0
-    assert run(plain, "set v1 --rgb #ff0000 --ramp hold") == 0
+    assert run(plain, "set v1 --rgb #ff0000 --ramp step") == 0
     assert run(plain, "ramp linear v2 v3") == 0
     edits = edits_of(plain)
     assert edits["ramp"] == "smooth"
     assert [entry["ramp"] for entry in edits["vertices"]] == ["hold", "linear", "linear"]
+    assert run(plain, "ramp hold v2") == 0  # what a step was called
+    assert [entry["ramp"] for entry in edits_of(plain)["vertices"]] == ["hold", "hold", "linear"]
     assert run(plain, "ramp linear") == 0
     assert "ramp" not in edits_of(plain)
 

@@ -266,7 +266,7 @@ def test_the_menu_of_a_stop_sets_its_ramp_and_locks_it(view: TimelineView) -> No
     at = QPointF(place(view, stop))
     menu = view.menu_for(view.places.hit(at), at.x())
     ramps = next(a.menu() for a in menu.actions() if a.menu() is not None)
-    next(a for a in ramps.actions() if a.text() == "hold").trigger()
+    next(a for a in ramps.actions() if a.text() == "step").trigger()
     assert view.session.document.grade.settings[stop].ramp == "hold"
     grade_steps.lock(view.session)
     assert view.session.document.grade.locks == (stop,)

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from palette4d.grade.grade import Grade
     from palette4d.grade.handle_edits import How
 
-#: The words of `palette4d.grade.edits.RAMPS`, which would be slow to import for the help.
-RAMPS = ("linear", "smooth", "hold")
+#: Those of `palette4d.grade.edits.RAMP_WORDS`, which would be slow to import for the help.
+RAMPS = ("linear", "smooth", "step")
 
 #: The most handles that an action reports one by one.
 MOST_LINES = 12
@@ -241,20 +241,32 @@ def _add_change(parser: argparse.ArgumentParser) -> None:
         help="frames of the ramp after B (default: as --fade)",
     )
     times.add_argument(
-        "--ramp", choices=RAMPS, help="the ramp of the changed handles, or of the fades of a range"
+        "--ramp",
+        type=_ramp,
+        choices=RAMPS,
+        help="the ramp of the changed handles, or of the fades of a range",
     )
+
+
+def _ramp(text: str) -> str:
+    """Argparse type: a ramp; files and earlier versions call the step "hold"."""
+    return "step" if text == "hold" else text
 
 
 def _add_ramp(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = _action(
         actions,
         "ramp",
-        "(linear | smooth | hold) [ID ...]",
+        "(linear | smooth | step) [ID ...]",
         "choose how edits go from one handle to the next handle in time: after these vertices or "
         "stops, or (without ID) wherever a handle has no ramp of its own.",
     )
     parser.add_argument(
-        "ramp", choices=RAMPS, metavar="RAMP", help="linear, smooth (no overshoot), or hold"
+        "ramp",
+        type=_ramp,
+        choices=RAMPS,
+        metavar="RAMP",
+        help="linear, smooth (no overshoot) or step",
     )
     parser.add_argument("ids", nargs="*", metavar="ID", help="vertices or stops")
     parser.set_defaults(run=run_ramp)

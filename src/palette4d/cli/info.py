@@ -227,6 +227,8 @@ def _some(names: list[str], most: int = 6) -> str:
 
 
 def _print_head(info: dict[str, Any]) -> None:
+    from palette4d.grade.edits import RAMP_WORDS
+
     first, last = info["frame_range"]
     numerator, denominator = info["rate"]
     step = f", every {info['frame_step']}" if info["frame_step"] != 1 else ""
@@ -252,7 +254,7 @@ def _print_head(info: dict[str, Any]) -> None:
         f"{counted(info['stops'], 'stop')}"
         + (f", {counted(info['picks'], 'pick')}" if info["picks"] else "")
         + (f", {counted(len(info['locks']), 'lock')}" if info["locks"] else "")
-        + (f", {info['ramp']} ramps" if info["ramp"] != "linear" else "")
+        + (f", {RAMP_WORDS[info['ramp']]} ramps" if info["ramp"] != "linear" else "")
         + (f"; {counted(info['steps'], 'step')} to undo" if info["steps"] else "")
     )
     if info["versions"]:
@@ -262,6 +264,7 @@ def _print_head(info: dict[str, Any]) -> None:
 
 def _print_stages(stages: list[dict[str, Any]]) -> None:
     """Print a table of the figures that stages share; below it, figures of single stages."""
+
     if not stages:
         return
     every = dict.fromkeys(name for stage in stages for name in stage if name != "stage")

@@ -274,7 +274,7 @@ class Document:
 
         Parameters
         ----------
-        ramp : {"linear", "smooth", "hold"}
+        ramp : {"linear", "smooth", "step"}
             Linear; the monotone cubic without overshoot; the handle's edit up to the next handle.
         id : str, optional
             The vertex or stop; None: all handles without a ramp of their own.

@@ -23,6 +23,8 @@ from palette4d.common.errors import Palette4dError
 Colour = tuple[float, float, float]
 Ramp = Literal["linear", "smooth", "hold"]
 RAMPS: tuple[Ramp, ...] = get_args(Ramp)
+#: The words for ramps; files say "hold", which is also a kind of pick.
+RAMP_WORDS: dict[Ramp, str] = {"linear": "linear", "smooth": "smooth", "hold": "step"}
 
 Kind = Literal["handle", "ramp", "pick", "lock", "version", "note"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -72,17 +74,17 @@ def as_colour(values: Iterable[float] | str, what: str = "colour") -> Colour:
 
 
 def as_ramp(ramp: str) -> Ramp:
-    """Return a ramp's name.
+    """Return a ramp as files name it.
 
     Raises
     ------
     Palette4dError
-        It is not one of `RAMPS`.
+        It is neither one of `RAMPS` nor in `RAMP_WORDS`.
     """
     for known in RAMPS:
-        if ramp == known:
+        if ramp in (known, RAMP_WORDS[known]):
             return known
-    raise Palette4dError(f"found the ramp {ramp!r}, expected {', '.join(RAMPS)}")
+    raise Palette4dError(f"found the ramp {ramp!r}, expected {', '.join(RAMP_WORDS.values())}")
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,17 @@ from typing import TypedDict, Unpack
 from palette4d.colour.oklch import Adjustment, adjuster
 from palette4d.common.errors import Arg, Palette4dError
 from palette4d.grade import colour_moves
-from palette4d.grade.edits import RAMP, Colour, Key, Ramp, Setting, as_colour, as_ramp, new_id
+from palette4d.grade.edits import (
+    RAMP,
+    RAMP_WORDS,
+    Colour,
+    Key,
+    Ramp,
+    Setting,
+    as_colour,
+    as_ramp,
+    new_id,
+)
 from palette4d.grade.grade import Grade, text_of
 from palette4d.grade.handles import unknown
 from palette4d.grade.palette import FAR, Near
@@ -37,7 +47,7 @@ class How(TypedDict, total=False):
         Only from frame `start` to `until`, with ramps of `fade` frames (at least one frame
         step) before and after, and nothing beyond. A range without one end goes on to that end
         of the clip. `fade_out` is the length of the ramp after it, if that differs.
-    ramp : {"linear", "smooth", "hold"}, optional
+    ramp : {"linear", "smooth", "step"}, optional
         The ramp of the handles that move, or of the fades of a range.
     any_value : bool
         Take colours such as 255 128 0 as they are.
@@ -265,9 +275,9 @@ def set_ramp(grade: Grade, ramp: str, id: str | None = None) -> Grade:
     """Set the ramp from a vertex or stop to the next handle in time, or the clip's ramp."""
     known = as_ramp(ramp)
     if id is None:
-        return grade.put(*RAMP, None if known == "linear" else known, f"ramp {known}")
+        return grade.put(*RAMP, None if known == "linear" else known, f"ramp {RAMP_WORDS[known]}")
     after = replace(grade.setting(id), ramp=known)
-    return grade.put("handle", id, after, f"ramp {known} from {id}")
+    return grade.put("handle", id, after, f"ramp {RAMP_WORDS[known]} from {id}")
 
 
 def lock(grade: Grade, *ids: str) -> Grade:

@@ -8,7 +8,7 @@ from typing import Any
 
 from palette4d.grade.colour_moves import fades_text
 from palette4d.grade.document import Document, OfClip
-from palette4d.grade.edits import Ramp
+from palette4d.grade.edits import RAMP_WORDS, Ramp
 from palette4d.grade.follow import Progress
 from palette4d.grade.later import Unread
 from palette4d.grade.picks import Area, Pick
@@ -95,7 +95,7 @@ def set_ramp(session: Session, ramp: Ramp) -> None:
         return
 
     def change(document: Document) -> None:
-        with document.one_step(f"ramp {ramp} {' '.join(ids)}".strip()):
+        with document.one_step(f"ramp {RAMP_WORDS[ramp]} {' '.join(ids)}".strip()):
             for id_ in ids:
                 document.set_ramp(ramp, id_)
             if not ids:

@@ -145,7 +145,7 @@ ACTIONS = {
         "act_until": "The selected pick acts until here",
         "ramp_linear": "Ramp: linear",
         "ramp_smooth": "Ramp: smooth",
-        "ramp_hold": "Ramp: hold",
+        "ramp_hold": "Ramp: step",
         "save_version": "Keep as a version",
         "compare_version": "Compare with a version",
         "switch": "A/B: switch between before and after",
@@ -507,7 +507,7 @@ SCOPE_TIPS = {
 RAMP = "Ramp"
 RAMP_TIP = "How the colour goes to the next handle; with nothing selected: the clip's default"
 RAMP_OF_CLIP = "as the clip"
-RAMPS = {"linear": "linear", "smooth": "smooth", "hold": "hold"}
+RAMPS = {"linear": "linear", "smooth": "smooth", "hold": "step"}
 RAMP_SET = "ramp: {ramp}"
 WHEEL = "Hue and chroma"
 WHEEL_TIP = "Drag: hue and chroma. Shift keeps the chroma, Ctrl the hue."
