@@ -256,19 +256,8 @@ def test_wrong_usage_is_2(edited: str, words: list[str]) -> None:
     assert Path(edited).read_bytes() == before
 
 
-@pytest.mark.parametrize(
-    ("words", "count"),
-    [
-        (["set", "v1", "--rgb", "-0.5", "0", "1"], (3, 3)),
-        (["set", "--near", "-0.1,0.9,0.1", "--frame", "0", "--rgb", "1", "0", "1"], (3, 3)),
-        (["set", "--near", "0.1,0.1,0.1", "--frame", "2.5", "--rgb", "-1,0,1"], (2, 4)),
-        (["set", "e1", "--frame", "2.5", "--rgb", "#102030"], (2, 4)),
-        (["move", "s1", "--frame", "3", "--by", "-0.1", "-0.1", "-0.1"], (2, 3)),
-        (["reset", "s1"], (2, 2)),
-    ],
-    ids=lambda value: value[0] if isinstance(value, list) else None,
-)
-def test_in_a_process(edited: str, words: list[str], count: tuple[int, int]) -> None:
+def test_in_a_process(edited: str) -> None:
+    words = ["set", "--near", "-0.1,0.9,0.1", "--frame", "0", "--rgb", "1", "0", "1"]
     result = subprocess.run(
         [sys.executable, "-m", "palette4d", "edit", edited, *words],
         capture_output=True,
@@ -278,8 +267,7 @@ def test_in_a_process(edited: str, words: list[str], count: tuple[int, int]) -> 
     )
     assert (result.returncode, result.stderr) == (0, "")
     assert result.stdout
-    found = edits_of(edited)
-    assert (len(found["vertices"]), len(found["stops"])) == count
+    assert [entry["vertex"] for entry in edits_of(edited)["vertices"]] == ["v3", "v4", "v17"]
 
 
 def test_a_read_only_folder(edited: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -317,24 +317,6 @@ def test_existing_picture_needs_force(tmp_path: Path, capsys: pytest.CaptureFixt
     assert out.read_bytes() == b"mine"
 
 
-@pytest.mark.parametrize("frame", [0.0, 2.25, 4.5, 6.0, 9.0, 9.25, 9.6, 14.0, 20.0])
-def test_bands_show_the_cores_colours(frame: float) -> None:
-    """The drawn interpolation in time equals the core's, original and edited."""
-    sidecar = _core.read_sidecar(str(GOLDEN / "v1_edited.p4d.json"))
-    palette = PlottedPalette.of(sidecar)
-    cut = _core.slice_at(sidecar.polytope, frame)
-    edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
-    for index, edge in enumerate(cut.edges):
-        if edge >= 0:
-            when = np.array([frame])
-            plain = palette.colours(edge, when, edited=False)[0]
-            np.testing.assert_allclose(plain, cut.rgb[index], atol=1e-12)
-            after = palette.colours(edge, when, edited=True)[0]
-            np.testing.assert_allclose(after, edited[index], atol=1e-12)
-        else:
-            np.testing.assert_allclose(palette.edited[cut.ends[index, 0]], edited[index])
-
-
 @pytest.mark.parametrize("name", ["v1_split", "v1_merge"])
 def test_a_fork_is_a_chain_of_its_own(name: str) -> None:
     palette = PlottedPalette.of(_core.read_sidecar(str(GOLDEN / f"{name}.p4d.json")))

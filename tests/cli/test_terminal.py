@@ -69,12 +69,3 @@ def test_a_name_in_a_progress_bar_is_printable(
     printed = capsys.readouterr().err
     assert r"\u001b[2J" in printed
     assert all(c.isprintable() for c in printed.replace("\r", "").replace("\n", ""))
-
-
-def test_patches_of_colour_still_reach_the_terminal(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
-    monkeypatch.delenv("NO_COLOR", raising=False)
-    assert main(["info", str(EDITED), "--handles"]) == 0
-    assert "\x1b[48;2;26;204;26m  \x1b[0m #1acc1a" in capsys.readouterr().out

@@ -108,45 +108,6 @@ def test_edited_colours_are_linear_between_handles(path: Path) -> None:
 # ------------------------------------------------------------------------------------------- edits
 
 
-def test_undo_and_redo(edited: Path) -> None:
-    document = Document.load(edited)
-    states = [document.fields()["edits"]]
-    for act in (
-        lambda: document.set("v1", rgb=WHITE),
-        lambda: document.stop("e1", frame=3, rgb=WHITE),
-        lambda: document.move("s1", frame=2),
-        lambda: document.shift("s1", by=(0.1, 0, -0.1)),
-        lambda: document.set_near((0.2, 0.2, 1), frame=9, rgb=(1, 0, 0)),
-        lambda: document.reset("v17"),
-        lambda: document.reset(),
-    ):
-        act()
-        states.append(document.fields()["edits"])
-    assert states[-1] == {"vertices": [], "stops": []}
-    assert len(document.history.done) == 7
-
-    def same(expected: dict[str, Any]) -> bool:
-        found = document.fields()["edits"]
-        return found["vertices"] == expected["vertices"] and (
-            sorted(found["stops"], key=str) == sorted(expected["stops"], key=str)
-        )
-
-    for expected in reversed(states[:-1]):
-        document.undo()
-        assert same(expected)
-    with pytest.raises(Palette4dError):
-        document.undo()
-    for expected in states[1:]:
-        document.redo()
-        assert same(expected)
-    with pytest.raises(Palette4dError):
-        document.redo()
-    document.undo()
-    document.set("v1", rgb=(0, 0, 0))
-    with pytest.raises(Palette4dError):  # another way was taken
-        document.redo()
-
-
 def test_what_is_edited_is_seen_at_once(plain: Path) -> None:
     document = Document.load(plain)
     document.grade.palette(0)

@@ -37,6 +37,9 @@ def test_steps_are_undone_in_other_sessions(plain: Path) -> None:
         lambda d: d.set_ramp("smooth"),
         lambda d: d.set_ramp("hold", "s1"),
         lambda d: d.move("s1", frame=4),
+        lambda d: d.shift("s1", by=(0.1, 0, -0.1)),
+        lambda d: d.set_near((0.2, 0.2, 1), frame=9, rgb=(1, 0, 0)),
+        lambda d: d.reset("v8"),
         lambda d: d.reset(),
     ]
     for each in acts:
@@ -93,6 +96,10 @@ def test_several_edits_are_one_step(plain: Path) -> None:
     ]
     document.undo()
     assert list(document.grade.settings) == ["v1"]
+    document.set("v4", rgb=(0, 0, 0))
+    with pytest.raises(Palette4dError):  # another way was taken
+        document.redo()
+    document.undo()
     before = document.fields()
     with contextlib.suppress(Palette4dError), document.one_step("half of it"):
         document.set("v2", rgb=(0, 0, 0))

@@ -140,7 +140,8 @@ def test_ticks_are_round_and_have_room() -> None:
 def test_colours_between_handles_are_the_cores() -> None:
     layout = timeline("v1_edited")
     palette = layout.palette
-    times = np.linspace(palette.first, palette.last, 37)
+    # Also at a stop, in a transition and where nothing but vertices is.
+    times = np.r_[np.linspace(palette.first, palette.last, 37), 4.5, 9, 9.25, 9.6]
     before, after = palette.sampled(times)
     for k, time in enumerate(times):
         cut = _core.slice_at(palette.sidecar.polytope, time)
@@ -149,3 +150,5 @@ def test_colours_between_handles_are_the_cores() -> None:
             if edge >= 0:
                 assert (before[edge, k] == cut.rgb[index]).all()
                 assert (after[edge, k] == edited[index]).all()
+            else:
+                assert (palette.edited[cut.ends[index, 0]] == edited[index]).all()
