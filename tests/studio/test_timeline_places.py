@@ -4,7 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
+from palette4d.studio.timeline_places import LOWEST
 from palette4d.studio.window import Window
+
+
+def test_ten_rows_fit_below_five_picks_in_a_small_window(opened: Window) -> None:
+    opened.resize(1000, 600)
+    opened.arrange()
+    for k in range(5):
+        colour = (0.1 + 0.15 * k, 0.5, 0.4)
+        opened.session.edit(
+            lambda document, colour=colour: document.pick(
+                12, colour=colour, by=(0.1, 0, 0), follow=False
+            )
+        )
+    places = opened.timeline.places
+    assert max(lane for _, lane in places.lanes()) == 4
+    assert places.room >= 10 * LOWEST
+    assert places.hidden == 0
 
 
 def test_rows_are_made_taller_and_lower(opened: Window) -> None:

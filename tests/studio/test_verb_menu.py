@@ -68,6 +68,33 @@ def answer(dialog: VerbDialog, text: str) -> None:
     next(button for button in box.buttons() if button.text() == text).click()
 
 
+def test_a_window_that_is_closed_asks_before_it_ends_a_job(
+    opened: Window, tmp_path: Path, qtbot: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dialog = opened.verbs.analyze_again()
+    line = dialog.entry("-o")
+    assert isinstance(line, QLineEdit)
+    line.setText(str(tmp_path / "again.p4d.json"))
+    dialog.start()
+    job = dialog.job
+    assert job is not None
+    monkeypatch.setattr(QMessageBox, "exec", lambda box: None)
+    chosen = [texts.GO_ON, texts.STOP_JOB]
+    monkeypatch.setattr(
+        QMessageBox,
+        "clickedButton",
+        lambda box: next(b for b in box.buttons() if b.text() == chosen[0]),
+    )
+    opened.close()
+    assert opened.isVisible()
+    assert not job.cancelled
+    chosen.pop(0)
+    opened.close()
+    assert not opened.isVisible()
+    assert job.wait(20) != 0
+    assert not (tmp_path / "again.p4d.json").exists()
+
+
 def test_escape_asks_and_stops_what_runs_and_the_dialog_says_so(
     opened: Window, tmp_path: Path, qtbot: Any
 ) -> None:

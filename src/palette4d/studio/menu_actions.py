@@ -4,6 +4,7 @@ Each action of `menu_entries.ACTIONS` is in `MenuActions.calls`, or a method of 
 `file_menu`, `verb_menu` or `help_menu`.
 """
 
+import functools
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +32,7 @@ class MenuActions:
         self.window, self.session, self.viewer = window, session, viewer
         #: The actions of one call.
         self.calls: dict[str, Callable[[], object]] = {
+            **{f"version_{n}": functools.partial(self.use_version, n) for n in range(1, 10)},
             "next_shot": lambda: window.shots.step(1),
             "previous_shot": lambda: window.shots.step(-1),
             "quit": window.close,

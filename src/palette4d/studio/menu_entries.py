@@ -123,6 +123,9 @@ ACTIONS = (
     Action("about", HELP),
 )
 
+#: The keys that use a version; the menu has the versions that there are.
+VERSION_ACTIONS = tuple(Action(f"version_{n}", PALETTE, (str(n),)) for n in range(1, 10))
+
 _timeline = functools.partial(Action, view="timeline")
 _solid = functools.partial(Action, view="solid")
 #: Actions of the timeline and of the solid. Their keys work while the view has the keyboard, their

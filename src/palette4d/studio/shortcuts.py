@@ -25,6 +25,7 @@ from palette4d.studio.menu_entries import (
     FIXED,
     SOLID_ACTIONS,
     TIMELINE_ACTIONS,
+    VERSION_ACTIONS,
     Action,
     title,
 )
@@ -52,7 +53,7 @@ class Shortcuts:
         self._settings, self._entry = settings, entry
         self.actions = {
             f"{action.view}.{action.name}": action
-            for action in (*ACTIONS, *TIMELINE_ACTIONS, *SOLID_ACTIONS)
+            for action in (*ACTIONS, *VERSION_ACTIONS, *TIMELINE_ACTIONS, *SOLID_ACTIONS)
             if action.name not in FIXED.get(action.view, ())
         }
         for name in self.actions:

@@ -148,6 +148,7 @@ ACTIONS = {
         "ramp_hold": "Ramp: step",
         "save_version": "Keep as a version",
         "compare_version": "Compare with a version",
+        **{f"version_{n}": f"Use version {n}" for n in range(1, 10)},
         "switch": "A/B: switch between before and after",
         "show_after": "After",
         "show_before": "Before",

@@ -18,7 +18,7 @@ from palette4d.studio import paint, texts, theme
 from palette4d.studio.frame_strip import FrameStrip
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
-from palette4d.studio.timeline_places import FOOT, GUTTER, LANE, RULER, SIDE, STRIP, TAIL, Places
+from palette4d.studio.timeline_places import FOOT, GUTTER, RULER, SIDE, STRIP, TAIL, Places
 
 F64 = NDArray[np.float64]
 #: The lower side of a band; its sides and its middle, its area, and the halves of that.
@@ -299,7 +299,7 @@ class TimelinePainter:
             QRectF(GUTTER, RULER + STRIP, self.places.width - GUTTER, self.places.upper)
         )
         for pick, lane in picks:
-            y, half = self.places.lane_y(lane), LANE / 2 - 2
+            y, half = self.places.lane_y(lane), self.places.lane_height / 2 - 1
             begin, start, until, end = (self.places.x_of(t) for t in self.places.reach(pick))
             start, until = max(start, begin + 0.5), max(until, start + 1)
             shape = np.array(
@@ -326,7 +326,8 @@ class TimelinePainter:
                     painter.setPen(paint.pen(grey, width))
                     painter.drawLine(QPointF(start + 4, y), QPointF(until - 4, y))
             x = self.places.x_of(pick.frame)
-            diamond = np.array([(x - 5, y), (x, y - 5), (x + 5, y), (x, y + 5)])
+            wide = min(5.0, half + 1)
+            diamond = np.array([(x - wide, y), (x, y - wide), (x + wide, y), (x, y + wide)])
             painter.setPen(paint.pen(style.INK, 1.2))
             painter.setBrush(QColor(style.BRIGHT))
             painter.drawPolygon(paint.polygon(diamond))
@@ -347,7 +348,7 @@ class TimelinePainter:
         for pick, lane in self.places.lanes():
             names.setdefault(lane, []).append(pick.id)
         for lane, ids in names.items():
-            box = QRectF(4, self.places.lane_y(lane) - LANE, GUTTER - 12, 2 * LANE)
+            box = QRectF(4, self.places.lane_y(lane) - 13, GUTTER - 12, 26)
             text = painter.fontMetrics().elidedText(
                 " ".join(ids), Qt.TextElideMode.ElideRight, int(box.width())
             )

@@ -19,15 +19,15 @@ from palette4d.studio.session import Session
 
 #: The column of colours at the left, the ruler, the frame strip, and the zoom bar, in pixels.
 GUTTER, RULER, STRIP, FOOT = 84, 24, 46, 12
-#: The height of a pick's range, and the most that are drawn above each other.
-LANE, MOST_LANES = 13, 5
+#: The height of a pick's range, that of more than two above each other, and the most of these.
+LANE, THIN_LANE, MOST_LANES = 13, 7, 5
 #: Space for the block names above the rows, below them, and beside the first and last frame.
 HEAD, TAIL, SIDE = 24.0, 10.0, 40.0
 #: The same space where there is one block, whose name says nothing.
 LOW_HEAD = 13.0
-#: The heights of a row, and the largest radius of a disc, in rows. In the lowest row there is space
-#: for the name of a disc.
-LOWEST, HIGHEST, RADIUS = 24.0, 46.0, 0.27
+#: The heights of a row, and the largest radius of a disc, in rows. Ten of the lowest rows fit below
+#: five picks in a window of 1000x600.
+LOWEST, HIGHEST, RADIUS = 9.0, 46.0, 0.27
 #: How many times as high rows can be made on demand.
 TALLEST = 6.0
 #: The fewest frames that fill the width.
@@ -173,8 +173,17 @@ class Places:
     @property
     def upper(self) -> float:
         """The y below the frame strip and the ranges of the picks."""
-        lanes = max((lane for _, lane in self.lanes()), default=-1) + 1
-        return RULER + STRIP + (lanes * LANE + 4 if lanes else 0)
+        lanes = self._lane_count
+        return RULER + STRIP + (lanes * self.lane_height + 4 if lanes else 0)
+
+    @property
+    def _lane_count(self) -> int:
+        return max((lane for _, lane in self.lanes()), default=-1) + 1
+
+    @property
+    def lane_height(self) -> int:
+        """The height of a pick's range."""
+        return LANE if self._lane_count <= 2 else THIN_LANE
 
     @property
     def head(self) -> float:
@@ -211,14 +220,17 @@ class Places:
 
     def lane_y(self, lane: int) -> float:
         """Return the middle of a lane."""
-        return RULER + STRIP + 4 + (lane + 0.5) * LANE
+        return RULER + STRIP + 4 + (lane + 0.5) * self.lane_height
 
     def _hit_lane(self, at: QPointF) -> Hit:
         """Return the pick at a point, and which end of its range or of its fades."""
         found = Hit("lane")
         for pick, lane in self.lanes():
             begin, start, until, end = (self.x_of(t) for t in self.reach(pick))
-            if abs(at.y() - self.lane_y(lane)) > LANE / 2 or not begin - 7 <= at.x() <= end + 7:
+            if (
+                abs(at.y() - self.lane_y(lane)) > self.lane_height / 2
+                or not begin - 7 <= at.x() <= end + 7
+            ):
                 continue
             ends = {"start": start, "until": until, "fade in": begin, "fade out": end}
             grip = min(ends, key=lambda name: abs(at.x() - ends[name]))  # of equals the range's

@@ -59,6 +59,7 @@ from palette4d.studio.solid_view import SolidView
 from palette4d.studio.start_page import StartPage
 from palette4d.studio.timeline_view import TimelineView
 from palette4d.studio.transport import Playback, Transport
+from palette4d.studio.verb_dialog import VerbDialog
 from palette4d.studio.verb_menu import VerbMenu
 from palette4d.studio.versions_gallery import Gallery
 from palette4d.studio.viewer import Viewer
@@ -398,11 +399,8 @@ class Window(QMainWindow):
         view.addSeparator()
         for dock in self.docks.values():
             view.addAction(dock.toggleViewAction())
-        for number in range(1, 10):
-            shortcut = QAction(self)
-            shortcut.setShortcut(QKeySequence(str(number)))
-            shortcut.triggered.connect(functools.partial(self.commands.use_version, number))
-            self.addAction(shortcut)
+        for action in menu_entries.VERSION_ACTIONS:
+            self.addAction(self._action(action))
 
     def _action(self, action: Action) -> QAction:
         made = QAction(action.text, self)
@@ -513,7 +511,8 @@ class Window(QMainWindow):
     def _fill_versions(self) -> None:
         self.versions.clear()
         for number, name in enumerate(self.session.versions, 1):
-            text = f"{name}\t{number}" if number < 10 else name
+            key = " ".join(self.keys.keys(f"window.version_{number}")) if number < 10 else ""
+            text = f"{name}\t{key}"
             self.versions.addAction(text, functools.partial(self.commands.use_version, number))
         if self.versions.isEmpty():
             self.versions.addAction(texts.NO_VERSIONS).setEnabled(False)
@@ -544,6 +543,12 @@ class Window(QMainWindow):
             event.ignore()
             return
         self._closing = False
+        jobs = [each.job for each in self.findChildren(VerbDialog) if each.job is not None]
+        if jobs and not self._may_stop():
+            event.ignore()
+            return
+        for job in jobs:
+            job.cancel()
         if not self.session.save():
             asks = QMessageBox(self)
             asks.setIcon(QMessageBox.Icon.Warning)
@@ -565,6 +570,15 @@ class Window(QMainWindow):
         self.settings.setValue("state", self.saveState())
         self.shut()
         event.accept()
+
+    def _may_stop(self) -> bool:
+        """Ask whether what still runs may be stopped."""
+        asks = QMessageBox(self)
+        asks.setText(texts.STOP_ASKED)
+        stop = asks.addButton(texts.STOP_JOB, QMessageBox.ButtonRole.DestructiveRole)
+        asks.setDefaultButton(asks.addButton(texts.GO_ON, QMessageBox.ButtonRole.RejectRole))
+        asks.exec()
+        return asks.clickedButton() == stop
 
     def _close_if_followed(self) -> None:
         if self._closing and not self.session.following:
