@@ -149,20 +149,19 @@ void bind_picks(py::module_& module) {
         "of the background, whether the object is where its areas are). An area is (points, "
         "half width).");
     module.def(
-        "pick_distances",
-        [](const py::object& colours, const Vec3& picked, const py::object& display) {
+        "pick_points",
+        [](const py::object& colours, const py::object& display) {
             const std::shared_ptr<const DisplayCurve> curve = curve_from(display);
-            const Vec3 own = pick_point(displayed(picked, curve.get()));
-            std::vector<double> distances;
-            for (const Vec3& colour : colours_from(colours, "colours")) {
-                const Vec3 point = pick_point(displayed(colour, curve.get()));
-                distances.push_back(std::sqrt(pick_distance2(point, own)));
+            std::vector<Vec3> points = colours_from(colours, "colours");
+            for (Vec3& point : points) {
+                point = pick_point(displayed(point, curve.get()));
+                point[2] *= kLightnessWeight;
             }
-            return to_array(distances);
+            return to_array(points);
         },
-        py::arg("colours"), py::arg("picked"), py::arg("display") = py::none(),
-        "(n,): distances of (n, 3) palette code values from a picked colour in pick space: two "
-        "coordinates of saturation, and 0.4 of lightness.");
+        py::arg("colours"), py::arg("display") = py::none(),
+        "(n, 3): palette code values in pick space: two coordinates of saturation, and 0.4 of "
+        "lightness.");
     module.def(
         "hue_matte", [](const Vec3& picked) { return grid_array(hue_matte(picked).odds); },
         py::arg("picked"), "(96, 96, 16) uint8 log odds of all colours of a display colour's hue.");

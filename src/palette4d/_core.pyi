@@ -216,12 +216,10 @@ class FramePicks:
     @property
     def left(self) -> F32 | None: ...
 
-def pick_distances(
-    colours: ArrayLike,
-    picked: Sequence[float],
-    display: tuple[float, float, Sequence[float]] | None = ...,
+def pick_points(
+    colours: ArrayLike, display: tuple[float, float, Sequence[float]] | None = ...
 ) -> F64:
-    """Return the (n,) distances of (n, 3) palette code values from a picked colour in pick space.
+    """Return (n, 3) palette code values in pick space.
 
     Its coordinates are two of saturation, and lightness times 0.4.
     """

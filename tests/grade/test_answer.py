@@ -7,7 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 import palette4d
-from palette4d.grade.answer import Answer
+from palette4d.common.text import percent
+from palette4d.grade.answer import Answer, Note
 from palette4d.grade.document import Document
 from palette4d.grade.picks import Area
 from palette4d.media.array_clip import ArrayClip
@@ -29,6 +30,16 @@ def document_of(
     return found
 
 
+def note(found: Answer, words: str) -> Note | None:
+    return next((each for each in found.notes if words in each.words), None)
+
+
+def again(document: Document, id: str = "p1") -> Answer:
+    found = document.answer(id)
+    assert found is not None
+    return found
+
+
 def answer(document: Document, pixel: tuple[float, float] = (40.0, 60.0)) -> Answer:
     pick = document.pick(0, pixel=pixel, box=9, to="#2040b0")
     found = document.answer(pick.id)
@@ -41,8 +52,7 @@ def test_one_thing_needs_no_help(monkeypatch: pytest.MonkeyPatch) -> None:
     picture[30:90, 20:60] = RED
     found = answer(document_of(monkeypatch, picture))
     assert found.share == pytest.approx(0.1, abs=0.01)
-    assert (found.other, found.hold, found.part, found.floods) == (None, None, None, False)
-    assert found.lines("p1") == ["takes 10 % of frame 0"]
+    assert found.lines() == ["takes 10 % of frame 0"]
 
 
 def test_a_proposed_hold_keeps_the_other_thing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -51,17 +61,14 @@ def test_a_proposed_hold_keeps_the_other_thing(monkeypatch: pytest.MonkeyPatch) 
     picture[30:90, 140:180] = RUST
     document = document_of(monkeypatch, picture)
     document.pick(0, pixel=(40.0, 60.0), box=9, to="#2040b0", reach=8)
-    found = document.answer("p1")
-    assert found is not None
-    assert found.other is not None
-    assert 140 <= found.other.pixel[0] < 180
-    if found.hold is None:
-        pytest.fail("no hold was proposed")
-    document.hold(0, pixel=found.hold.pixel, box=found.hold.box)
-    again = document.answer("p1")
-    assert again is not None
-    assert again.others <= found.hold.left + 0.005
-    assert again.share > 0.08
+    also = again(document).notes[0]
+    assert also.place is not None
+    assert 140 <= also.place.pixel[0] < 180
+    assert also.gesture == "hold"
+    document.hold(0, pixel=also.place.pixel, box=also.place.box)
+    found = again(document)
+    assert note(found, "also takes") is None
+    assert found.share == pytest.approx(0.1, abs=0.02)
 
 
 def test_a_pick_that_floods_is_warned_of(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -70,11 +77,10 @@ def test_a_pick_that_floods_is_warned_of(monkeypatch: pytest.MonkeyPatch) -> Non
     picture = np.tile((1 - part) * RED + part * np.array([0.5, 0.36, 0.3]), (H, 1, 1))
     picture[:20] = GREY
     found = answer(document_of(monkeypatch, picture))
-    assert found.floods
-    assert any("more than one thing" in line for line in found.lines("p1"))
+    assert note(found, "more than one thing") is not None
     wall = np.tile(RED, (H, W, 1))
     wall[:20] = GREY
-    assert not answer(document_of(monkeypatch, wall)).floods
+    assert note(answer(document_of(monkeypatch, wall)), "more than one thing") is None
 
 
 @pytest.mark.parametrize(
@@ -90,17 +96,17 @@ def test_a_proposed_box_adds_the_rest_of_the_thing(
     if elsewhere:
         picture[30:90, 150:190] = 0.35 * RED
     document = document_of(monkeypatch, picture)
-    part = answer(document).part
+    part = note(answer(document), "does not take")
     assert (part is not None) == proposed
     if part is None:
         return
-    assert 60 <= part.pixel[0] < 100
-    assert part.share == pytest.approx(0.092, abs=0.005)
-    document.add_area("p1", Area(0, (part.pixel,), part.box / 2))
-    again = document.answer("p1")
-    assert again is not None
-    assert again.share == pytest.approx(part.left, abs=0.01)
-    assert again.share > 0.17
+    assert part.place is not None
+    assert part.gesture == "area"
+    assert 60 <= part.place.pixel[0] < 100
+    document.add_area("p1", Area(0, (part.place.pixel,), part.place.box / 2))
+    found = again(document)
+    assert percent(found.share) in part.effect
+    assert found.share > 0.17
 
 
 @pytest.mark.parametrize(("columns", "proposed"), [(2, True), (6, False)])
@@ -113,10 +119,7 @@ def test_a_proposed_hold_costs_the_thing_little(
     picture[30:90, 140:180] = picture[30:90, 60 - columns : 60] = RUST
     document = document_of(monkeypatch, picture)
     document.pick(0, pixel=(30.0, 60.0), box=9, to="#2040b0", reach=8)
-    found = document.answer("p1")
-    assert found is not None
-    assert found.other is not None
-    assert (found.hold is not None) == proposed
+    assert (again(document).notes[0].gesture == "hold") == proposed
 
 
 @pytest.mark.parametrize("borders", [2, 3])
@@ -134,7 +137,7 @@ def test_a_region_along_three_borders_may_be_too_much(
     picture[region] = (1 - along) * RED + along * np.array([0.5, 0.36, 0.3])
     found = answer(document_of(monkeypatch, picture), (10.0, 20.0))
     assert found.share < 0.4
-    assert found.floods == (borders == 3)
+    assert (note(found, "more than one thing") is not None) == (borders == 3)
 
 
 def test_a_hold_has_a_share_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -142,10 +145,9 @@ def test_a_hold_has_a_share_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     picture[30:90, 20:60] = RED
     document = document_of(monkeypatch, picture)
     hold = document.hold(0, pixel=(40.0, 60.0), box=9)
-    found = document.answer(hold.id)
-    assert found is not None
+    found = again(document, hold.id)
     assert found.share == pytest.approx(0.1, abs=0.01)
-    assert found.hold is None
+    assert found.notes == ()
 
 
 def test_areas_of_the_frame_are_the_picked_thing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -153,11 +155,73 @@ def test_areas_of_the_frame_are_the_picked_thing(monkeypatch: pytest.MonkeyPatch
     picture[30:90, 20:60] = RED
     picture[30:90, 140:180] = RED
     document = document_of(monkeypatch, picture)
-    assert answer(document).others > 0.05
+    assert note(answer(document), "its colour elsewhere") is not None
     document.add_area("p1", Area(0, ((160.0, 60.0),), 4.0))
-    found = document.answer("p1")
-    assert found is not None
-    assert found.others < 0.005
+    assert note(again(document), "its colour elsewhere") is None
+
+
+def test_a_hold_that_costs_the_thing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the thing's two parts, the hold on what looks like the second one takes it."""
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = RED
+    picture[30:90, 40:60] = picture[30:90, 140:180] = 0.5 * (RED + RUST)
+    document = document_of(monkeypatch, picture)
+    answer(document, (30.0, 60.0))
+    hold = document.hold(0, pixel=(160.0, 60.0), box=9)
+    for id_ in ("p1", hold.id):
+        costs = note(again(document, id_), f"{hold.id} also costs p1")
+        assert costs is not None
+        assert costs.place is not None
+        assert 40 <= costs.place.pixel[0] < 60
+    other = document.hold(0, pixel=(110.0, 10.0), box=9)
+    assert note(again(document, other.id), "no pick takes less") is not None
+
+
+def test_what_was_marked_and_is_held_names_the_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = RED
+    picture[30:90, 140:180] = np.array([0.2, 0.3, 0.7])
+    document = document_of(monkeypatch, picture)
+    answer(document)
+    hold = document.hold(0, pixel=(160.0, 60.0), box=9)
+    document.add_area("p1", Area(0, ((160.0, 60.0),), 4.0))
+    left = note(again(document), "what you marked")
+    assert left is not None
+    assert f"{hold.id} keeps it" in left.words
+
+
+def test_a_pick_over_an_earlier_one_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = RED
+    document = document_of(monkeypatch, picture)
+    answer(document)
+    document.pick(0, pixel=(41.0, 61.0), box=9, to="#20b040")
+    assert note(again(document, "p2"), "p1 takes") is not None
+    assert note(again(document, "p1"), "p2 takes") is None
+
+
+def test_another_hue_that_is_connected_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A face above a red shirt has nearly its colour."""
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = [0.67, 0.39, 0.4]
+    picture[30:55, 20:60] = [0.63, 0.41, 0.29]
+    document = document_of(monkeypatch, picture)
+    document.pick(0, pixel=(40.0, 75.0), box=9, to="#2040b0", reach=6)
+    also = note(again(document), "another hue")
+    assert also is not None
+    assert also.place is not None
+    assert 30 <= also.place.pixel[1] < 55
+
+
+def test_a_box_on_two_colours_has_the_main_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = RED
+    document = document_of(monkeypatch, picture)
+    pick = document.pick(0, pixel=(57.0, 60.0), box=9, to="#2040b0")
+    assert pick.rgb == pytest.approx(tuple(RED), abs=0.02)
+    assert not any("of the box" in line for line in document.pick_warnings(pick.id))
+    pick = document.pick(0, pixel=(59.0, 60.0), box=11, to="#2040b0")
+    assert any("of the box" in line for line in document.pick_warnings(pick.id))
 
 
 def test_without_the_clip_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:

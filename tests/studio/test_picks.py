@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +23,10 @@ from PySide6.QtWidgets import QApplication, QWidget
 import palette4d
 from palette4d.cli.main import main
 from palette4d.common.text import percent
-from palette4d.grade.answer import Answer, Place
+from palette4d.grade.answer import Answer, Note, Place
 from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.picks import Pick
-from palette4d.studio import grade_steps, states
+from palette4d.studio import grade_steps, states, theme
 from palette4d.studio.pick_panel import PickPanel
 from palette4d.studio.session import Session
 from palette4d.studio.window import Window
@@ -224,8 +225,9 @@ def test_the_answer_says_what_a_pick_takes(qtbot: Any, opened: Window) -> None:
     assert session.answer == expected
     assert expected is not None
     assert percent(expected.share) in panel.takes.words.text()
-    assert panel.other.isVisibleTo(panel) == (expected.other is not None)
-    assert panel.part.isVisibleTo(panel) == (expected.part is not None)
+    assert [line.isVisibleTo(panel) for line in panel.notes] == [
+        k < len(expected.notes) for k in range(len(panel.notes))
+    ]
     session.select()
     assert session.answer is None
     assert not panel.isVisibleTo(opened)
@@ -236,18 +238,17 @@ def test_the_answers_buttons_do_what_it_proposes(qtbot: Any, opened: Window, sid
     session, panel = opened.session, opened.inspector.panel
     session.save()
     twin = Path(shutil.copy(sidecar, sidecar.with_name("twin.p4d.json")))
-    green, sky = (
-        Place((120, 70), 5, (0.3, 0.4, 0.2), 0.02, 0.001),
-        Place((90, 12), 7, (0, 0, 1), 0.1),
-    )
-    answered(panel, Answer(6, 0.2, 0.02, other=green, hold=green, part=sky))
-    assert panel.other.button.isVisibleTo(panel)
-    assert "0.1 %" in panel.other.button.toolTip()
-    qtbot.mouseClick(panel.part.button, LEFT)
+    green = Note("also", Place(6, (120, 70), 5, (0.3, 0.4, 0.2)), "hold", "leaves 0.1 %", "p1")
+    sky = Note("not", Place(6, (90, 12), 7, (0, 0, 1)), "area", "then takes 10 %", "p1")
+    other, part = panel.notes[:2]
+    answered(panel, Answer(6, 0.2, (green, sky)))
+    assert other.button.isVisibleTo(panel)
+    assert "0.1 %" in other.button.toolTip()
+    qtbot.mouseClick(part.button, LEFT)
     qtbot.waitUntil(lambda: not session.following, timeout=20_000)
-    answered(panel, Answer(6, 0.2, 0.02, other=green, hold=green))
-    assert not panel.part.isVisibleTo(panel)
-    qtbot.mouseClick(panel.other.button, LEFT)
+    answered(panel, Answer(6, 0.2, (green,)))
+    assert not part.isVisibleTo(panel)
+    qtbot.mouseClick(other.button, LEFT)
     qtbot.waitUntil(lambda: not session.following, timeout=20_000)
     assert session.selection == ("p1",)  # its answer is found again
     assert session.save()
@@ -257,18 +258,18 @@ def test_the_answers_buttons_do_what_it_proposes(qtbot: Any, opened: Window, sid
     ):
         assert main(["edit", str(twin), *words]) == 0
     assert sidecar.read_bytes() == twin.read_bytes()
-    answered(panel, Answer(6, 0.2, 0.02, other=green))  # no hold helps
-    assert panel.other.isVisibleTo(panel)
-    assert not panel.other.button.isVisibleTo(panel)
+    answered(panel, Answer(6, 0.2, (replace(green, gesture=""),)))  # no hold helps
+    assert other.isVisibleTo(panel)
+    assert not other.button.isVisibleTo(panel)
 
 
 def test_a_pick_that_floods_is_a_warning(qtbot: Any, opened: Window) -> None:
     pick(qtbot, opened, 40, 30)
     panel = opened.inspector.panel
-    answered(panel, Answer(6, 0.7, floods=True))
-    assert "more than one thing" in panel.warning.words.text()
+    answered(panel, Answer(6, 0.7, (Note("more than one thing", warns=True),)))
+    assert theme.WARNING in panel.notes[0].words.styleSheet()
     answered(panel, Answer(6, 0.2))
-    assert not panel.warning.isVisibleTo(panel)
+    assert not panel.notes[0].isVisibleTo(panel)
 
 
 def test_what_speaks_against_a_pick_stands_in_its_panel(qtbot: Any, opened: Window) -> None:

@@ -126,7 +126,7 @@ def _add_where(parser: argparse.ArgumentParser, required: bool = True) -> None:
         "--box",
         type=whole(1),
         metavar="N",
-        help="with --pixel: the mean of N x N pixels (default 1)",
+        help="with --pixel: the main colour of N x N pixels (default 1)",
     )
     parser.add_argument(
         "--clip", metavar="CLIP", help="the clip (default: the sidecar's, if it is there)"
@@ -244,16 +244,9 @@ def run_area(args: argparse.Namespace) -> int:
     document = load(args.sidecar)
     points = (args.pixel,) if args.stroke is None else tuple(args.stroke)
     size = (args.box if args.stroke is None else args.width) or 9
-    before = document.answer(args.id, args.clip, tries=False)
-    found = document.add_area(args.id, Area(args.frame, points, size / 2), clip=args.clip)
+    document.add_area(args.id, Area(args.frame, points, size / 2), clip=args.clip)
     document.save()
     _print_pick(args, document, args.id)
-    after = document.answer(args.id, args.clip, tries=False)
-    if found.kind == "pick" and before and after and abs(after.share - before.share) < 0.002:
-        print(
-            f"  takes as much as before: what you marked was taken, or looks like what is around "
-            f"it. Where it has another colour, pick it too; else change {args.id} --reach 1"
-        )
     return 0
 
 
@@ -370,15 +363,8 @@ def _print_pick(
     found = next(pick for pick in document.grade.picks if pick.id == id_)
     print(_told(document, found, followed))
     answer = document.answer(id_, clip) if found.enabled else None
-    for line in () if answer is None else answer.lines(id_):
+    for line in () if answer is None else answer.lines():
         print(f"  {line}")
-    if found.kind == "pick":
-        return
-    for pick in document.grade.picks:  # what the hold leaves of them
-        if pick.kind == "pick" and pick.enabled:
-            left = document.answer(pick.id, clip, tries=False)
-            for line in () if left is None else left.lines(pick.id):
-                print(f"  {pick.id} now {line.strip()}")
 
 
 def _told(document: Document, pick: Pick, followed: bool = False) -> str:

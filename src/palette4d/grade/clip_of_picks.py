@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.common.errors import Arg, Message, Palette4dError
-from palette4d.common.text import hex_of
+from palette4d.common.text import hex_of, percent
 from palette4d.grade import follow
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.follow import Progress
@@ -36,6 +36,8 @@ DIGITS = 6
 OTHER_CLIP = 0.16
 #: A colour of another clip is here if a connected region of this share of a frame has it.
 LEAST_REGION = 5e-4
+#: A box with more than this share of other colours than its main one is reported.
+MIXED = 0.25
 #: Distance in pick space within which two clips' colours are the same thing's.
 SAME_COLOUR = 0.06
 
@@ -64,9 +66,12 @@ class ClipOfPicks:
     ----------
     unread : bool
         It is read later (`grade.later`): paths and mattes are not known yet.
+    display : tuple or None
+        `mattes.display_curve` of the palette's encoding.
     """
 
     unread = False
+    display: Display | None = None
 
     def __init__(
         self,
@@ -84,7 +89,9 @@ class ClipOfPicks:
     def of(cls, grade: Grade, given: Given = None) -> ClipOfPicks:
         """Return the clip of a grade, or the user's."""
         own = grade.analysed.conversion
-        return cls(grade.members["clip"], None if own is None else own.steps, grade.path, given)
+        found = cls(grade.members["clip"], None if own is None else own.steps, grade.path, given)
+        found.display = grade.display()
+        return found
 
     def open(self) -> Clip | None:
         """Return the clip, or None if none was given and the sidecar's clip is not there.
@@ -120,8 +127,9 @@ class ClipOfPicks:
         return clip
 
     def colour(self, frame: float, pixel: tuple[float, float], box: int) -> Colour:
-        """Return the mean colour of a box around a pixel, in the palette's code values."""
-        return as_colour(np.round(self.box(frame, pixel, box).mean(axis=0), DIGITS))
+        """Return the main colour of a box around a pixel, in the palette's code values."""
+        colours = self.box(frame, pixel, box)
+        return as_colour(np.round(colours[main_colour(colours, self.display)].mean(axis=0), DIGITS))
 
     def box(self, frame: float, pixel: tuple[float, float], box: int) -> NDArray[np.float64]:
         """Return the (n, 3) colours of a box around a pixel, in the palette's code values.
@@ -204,8 +212,9 @@ class ClipOfPicks:
         pixels = self.read(frame)
         real = np.asarray(np.isfinite(pixels).all(axis=2))
         colours = np.where(real[..., None], pixels, 0).reshape(-1, 3)
-        distances = _core.pick_distances(colours, pick.rgb, display).reshape(real.shape)
-        alike = ndimage.binary_opening((distances < SAME_COLOUR) & real)
+        off = _core.pick_points(colours, display) - _core.pick_points([pick.rgb], display)
+        near = (np.linalg.norm(off, axis=1) < SAME_COLOUR).reshape(real.shape)
+        alike = ndimage.binary_opening(near & real)
         if not alike.any():
             return None
         largest, place, box = largest_part(alike)
@@ -235,6 +244,15 @@ class ClipOfPicks:
                 f"analysed; if it is another clip, give the analysed one as {Arg('clip')}, or "
                 "analyse it"
             )
+        if pick.pixel is not None:
+            box = self.box(frame, pick.pixel, pick.box or 1)
+            others = ~main_colour(box, self.display)
+            if others.mean() > MIXED:
+                lines.append(
+                    f"{percent(float(others.mean()))} of the box of {pick.id} has other colours, "
+                    f"such as {hex_of(np.median(box[others], axis=0).tolist())}; it has the main "
+                    f"one. Pick inside of one colour, or give a smaller {Arg('box')}"
+                )
         away = np.linalg.norm(rgb - pick.rgb, axis=1)
         if away.min() > ALIKE:
             lines.append(
@@ -296,6 +314,18 @@ def corrected(pick: Pick, frame: float, rgb: Colour) -> Pick:
     keys = {key.frame: key for key in pick.path if key.given and key.frame != pick.frame}
     keys[frame] = PathKey(frame, rgb, True)
     return replace(pick, path=tuple(keys[f] for f in sorted(keys)))
+
+
+def main_colour(colours: NDArray[np.float64], display: Display | None) -> NDArray[np.bool_]:
+    """Return which of (n, 3) colours are the main one's: near the colour that most are near.
+
+    Near in pick space, where the shades of a thing are.
+    """
+    points = _core.pick_points(colours, display)
+    some = points[:: -(-len(points) // 1024)]
+    near = ((some[:, None] - some) ** 2).sum(axis=2) < ALIKE**2
+    main = some[near[near.sum(axis=1).argmax()]].mean(axis=0)
+    return np.asarray(((points - main) ** 2).sum(axis=1) < (2 * ALIKE) ** 2)
 
 
 def largest_part(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], tuple[int, int], int]:

@@ -377,14 +377,12 @@ class Document:
         """Remove picks and holds. Without a hold, the others' mattes are learned again."""
         self._take(pick_edits.unpick(self.grade, self._clip(clip), *ids))
 
-    def answer(
-        self, id: str, clip: OfClip | None = None, *, tries: bool = True
-    ) -> answer.Answer | None:
-        """Return what a pick takes of its frame, what else it takes, and what would help.
+    def answer(self, id: str, clip: OfClip | None = None) -> answer.Answer | None:
+        """Return what a pick or hold takes of its frame, what else it does, and what would help.
 
-        None where the clip is not there. Without `tries` nothing is proposed; it is quicker.
+        None where the clip is not there.
         """
-        return answer.answer_to(self.grade, self.grade.pick(id), self._clip(clip), tries=tries)
+        return answer.answer_to(self.grade, self.grade.pick(id), self._clip(clip))
 
     def pick_warnings(self, id: str, clip: OfClip | None = None) -> tuple[str, ...]:
         """Return what speaks against the clip of a pick or hold, and its colour."""

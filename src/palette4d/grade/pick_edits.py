@@ -52,7 +52,7 @@ class Asked(When, total=False):
     pixel : (float, float)
         Instead of `colour`: a pixel of the clip's frame, x from the left, y from the top.
     box : int
-        With `pixel`: the side of the box around it whose mean is picked.
+        With `pixel`: the side of the box around it whose main colour is picked.
     areas : sequence of Area
         More parts of the thing: boxes and strokes.
     to, by : 3 floats

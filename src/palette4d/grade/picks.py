@@ -104,7 +104,7 @@ class Pick:
     path : tuple of PathKey
         Where the colour is at other frames, linear between the keys; empty: always `rgb`.
     pixel, box : (x, y) and int, or None
-        The pixel and the side of the box around it whose mean was picked.
+        The pixel and the side of the box around it whose main colour was picked.
     areas : tuple of Area
         More parts of the object, which its matte is learned from.
     matte : str or None

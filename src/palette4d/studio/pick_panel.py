@@ -36,6 +36,9 @@ U8 = NDArray[np.uint8]
 REST = 300
 #: A reach this near 0 becomes 0.
 SNAP = 0.12
+#: Notes of an answer that are shown, from the first on.
+NOTES = 8
+WARNS = f"color: {theme.WARNING}"
 #: Colours of a bar.
 SAMPLES = 24
 #: The width of the numbers beside the bars.
@@ -47,7 +50,7 @@ SWATCH = QSize(14, 14)
 class Line(QWidget):
     """A line of the answer: a colour, words, and what would help."""
 
-    def __init__(self, button: str = "") -> None:
+    def __init__(self) -> None:
         """Begin hidden."""
         super().__init__()
         self.swatch, self.words = QLabel(), QLabel()
@@ -60,8 +63,8 @@ class Line(QWidget):
         row.setSpacing(6)
         row.addWidget(self.swatch)
         row.addWidget(self.words, 1)
-        self.button = QPushButton(button)
-        self.button.setVisible(bool(button))
+        self.button = QPushButton()
+        self.button.hide()
         row.addWidget(self.button)
         self.hide()
 
@@ -95,12 +98,11 @@ class PickPanel(QWidget):
         column.addLayout(self._make_tools())
         column.addWidget(self._make_shape())
         self.takes, self.warning = Line(), Line()
-        self.other = Line(texts.ADD_HOLD)
-        self.part = Line(texts.ADD_BOX)
-        self.other.button.clicked.connect(self._add_hold)
-        self.part.button.clicked.connect(self._add_box)
-        self.warning.words.setStyleSheet(f"color: {theme.WARNING}")
-        for line in (self.takes, self.other, self.part, self.warning):
+        self.notes = [Line() for _ in range(NOTES)]
+        for k, line in enumerate(self.notes):
+            line.button.clicked.connect(lambda _=False, k=k: self._do(k))
+        self.warning.words.setStyleSheet(WARNS)
+        for line in (self.takes, *self.notes, self.warning):
             column.addWidget(line)
         for event in ("document", "selection", "clip"):
             session.on(event, self.refresh, panel=True, follows=lambda: True)
@@ -228,19 +230,18 @@ class PickPanel(QWidget):
             said = texts.ITS_HUE if on else texts.ITS_COLOURS
             grade_steps.change_pick(self.session, pick.id, said, whole_hue=on)
 
-    def _add_hold(self) -> None:
-        """Hold what the answer proposes."""
+    def _do(self, k: int) -> None:
+        """Do what a note of the answer proposes."""
         found = self.session.answer
-        if found is not None and found.hold is not None:
-            (x, y), hold = found.hold.pixel, found.hold
-            grade_steps.hold(self.session, Place(found.frame, x, y, hold.box, hold.rgb))
-
-    def _add_box(self) -> None:
-        """Add the part that the answer proposes."""
-        found, pick = self.session.answer, self.session.picked
-        if found is not None and found.part is not None and pick is not None:
-            area = Area(found.frame, (found.part.pixel,), found.part.box / 2)
-            grade_steps.add_area(self.session, pick.id, area)
+        note = None if found is None else found.notes[k]
+        if note is None or note.place is None:
+            return
+        at = note.place
+        if note.gesture == "hold":
+            grade_steps.hold(self.session, Place(at.frame, *at.pixel, at.box, at.rgb))
+        else:
+            area = Area(at.frame, (at.pixel,), at.box / 2)
+            grade_steps.add_area(self.session, note.id, area)
 
     # ---------------------------------------------------------------------------------- the answer
 
@@ -267,8 +268,8 @@ class PickPanel(QWidget):
         known = session.answer if asked == self._known else None
         self._waits = asked
         if known is None:
-            self.other.button.setEnabled(False)
-            self.part.button.setEnabled(False)
+            for line in self.notes:
+                line.button.setEnabled(False)
         if session.answer is None:
             self._clear(texts.LOOKING)
 
@@ -292,7 +293,7 @@ class PickPanel(QWidget):
 
     def _clear(self, words: str = "") -> None:
         """Show no answer, but words instead of it."""
-        for line in (self.other, self.part, self.warning):
+        for line in (*self.notes, self.warning):
             line.say("")
         self.takes.say(words)
 
@@ -303,24 +304,18 @@ class PickPanel(QWidget):
         if found is not None and pick is not None:
             says = texts.TAKES if pick.kind == "pick" else texts.KEEPS
             self.takes.say(says.format(share=percent(found.share), frame=found.frame))
-            if found.other is not None:
-                (x, y), share = found.other.pixel, percent(found.others)
-                words = texts.ALSO_TAKES.format(share=share, x=x, y=y)
-                self.other.say(words, on_screen(self.session, found.other.rgb))
-            if found.part is not None:
-                (x, y), share = found.part.pixel, percent(found.part.share)
-                words = texts.LEAVES_OUT.format(share=share, x=x, y=y)
-                self.part.say(words, on_screen(self.session, found.part.rgb))
-            for line, place, tip in (
-                (self.other, found.hold, texts.ADD_HOLD_TIP),
-                (self.part, found.part, texts.ADD_BOX_TIP),
-            ):
+            for line, note in zip(self.notes, found.notes, strict=False):
+                at = note.place
+                line.words.setStyleSheet(WARNS if note.warns else "")
+                where = "" if at is None else texts.NOTE_AT.format(x=at.pixel[0], y=at.pixel[1])
+                line.say(
+                    f"{note.words[0].upper()}{note.words[1:]}{where}.",
+                    None if at is None else on_screen(self.session, at.rgb),
+                )
                 line.button.setEnabled(True)
-                line.button.setVisible(place is not None)
-                left = "" if place is None else percent(place.left)
-                line.button.setToolTip(tip.format(share=left))
-            if found.floods:
-                told.insert(0, texts.FLOODS)
+                line.button.setVisible(bool(note.gesture))
+                line.button.setText(texts.ADD_HOLD if note.gesture == "hold" else texts.ADD_BOX)
+                line.button.setToolTip(note.effect)
         self.warning.say("\n".join(told))
 
 

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
+from palette4d.grade.clip_of_picks import main_colour
+from palette4d.grade.edits import as_colour
 from palette4d.studio import texts
 from palette4d.studio.preview import Grade, Preview
 from palette4d.studio.session import Session
@@ -43,8 +45,8 @@ def place_between(session: Session, first: tuple[int, int], last: tuple[int, int
     if not len(colours):
         session.say(texts.NO_COLOUR, "warning")
         return None
-    mean = colours.mean(axis=0).tolist()
-    return Place(session.frame, x, y, side, (mean[0], mean[1], mean[2]))
+    main = colours[main_colour(colours, session.document.grade.display())].mean(axis=0)
+    return Place(session.frame, x, y, side, as_colour(main.tolist()))
 
 
 def probe_at(session: Session, x: int, y: int) -> Probe | None:

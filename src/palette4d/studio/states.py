@@ -86,7 +86,7 @@ class Place:
     box : int
         The box's side in pixels, odd; 1 is the pixel.
     colour : tuple of float
-        The mean colour there, in the palette's code values.
+        The main colour there, in the palette's code values.
     """
 
     frame: int

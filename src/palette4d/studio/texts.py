@@ -211,11 +211,11 @@ ACTIONS = {
 #: What the pointer and held keys do: where, the gesture, and what it does.
 GESTURES = (
     ("picture", "click", "pick: choose what the colour becomes"),
-    ("picture", "drag", "pick the mean colour of a box"),
+    ("picture", "drag", "pick the main colour of a box"),
     (
         "picture",
         "Alt-click or Ctrl-click",
-        "hold: the colour stays; with a drag, the mean of a box",
+        "hold: the colour stays; with a drag, the main colour of a box",
     ),
     (
         "picture",
@@ -566,14 +566,7 @@ MATTE_TIP = "Show what it takes; the rest is dark and grey (M)"
 AREA_ADDED = "{id} has learned what was added"
 LOOKING = "measuring what it takes…"
 TAKES, KEEPS = "Takes {share} of frame {frame}.", "Keeps {share} of frame {frame}."
-ALSO_TAKES = "Also takes {share} elsewhere, most of it at {x}, {y}."
-LEAVES_OUT = "Leaves out {share} beside it, at {x}, {y}."
-ADD_HOLD, ADD_HOLD_TIP = "Add this hold", "Then it takes {share} elsewhere"
-ADD_BOX, ADD_BOX_TIP = "Add this box", "Then it takes {share}"
-FLOODS = (
-    "This may be more than one thing: look at its matte. Add a hold on what must stay, or lower "
-    "the reach."
-)
+NOTE_AT, ADD_HOLD, ADD_BOX = ", at {x}, {y}", "Add this hold", "Add this box"
 ENABLED, DISABLED = "{ids} acts again", "{ids} does not act"
 REMOVE = "Remove"
 REMOVED = "removed {ids}"

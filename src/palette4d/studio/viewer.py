@@ -552,7 +552,7 @@ class Viewer(QWidget):
         return abs(point.x() - self.wipe_x()) <= NEAR_WIPE
 
     def place(self, start: QPointF, end: QPointF) -> Place | None:
-        """Return the pixel or the box between two points of the widget, with its mean colour."""
+        """Return the pixel or the box between two points of the widget, with its main colour."""
         first, last = self.pixel_at(start), self.pixel_at(end) or self.pixel_at(start)
         return None if first is None or last is None else place_between(self.session, first, last)
 

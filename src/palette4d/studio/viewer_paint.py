@@ -180,17 +180,14 @@ class ViewerPainter:
         for area in pick.areas:
             if area.frame == session.frame:
                 self._stroke(painter, area.points, area.radius, 70)
-        if found is None or found.frame != session.frame:
-            return
-        for place, text in (
-            (found.other if found.hold is None else None, texts.ALSO),
-            (found.hold, texts.PROPOSED_HOLD),
-            (found.part, texts.PROPOSED_BOX),
-        ):
-            if place is not None:
-                box = self._mark(painter, *place.pixel, place.box, hold=True, dashed=True)
-                shown = on_screen(session, np.array([place.rgb]))
-                _flag(painter, box, text, shown, bright=False)
+        for note in () if found is None else found.notes:
+            place = note.place
+            if place is None or place.frame != session.frame:
+                continue
+            box = self._mark(painter, *place.pixel, place.box, hold=True, dashed=True)
+            text = {"": texts.ALSO, "hold": texts.PROPOSED_HOLD, "area": texts.PROPOSED_BOX}
+            shown = on_screen(session, np.array([place.rgb]))
+            _flag(painter, box, text[note.gesture], shown, bright=False)
 
     def _draw_brush(self, painter: QPainter) -> None:
         """Draw the stroke, and the brush at the pointer."""
