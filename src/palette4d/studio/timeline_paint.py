@@ -348,7 +348,9 @@ class TimelinePainter:
         for pick, lane in self.places.lanes():
             names.setdefault(lane, []).append(pick.id)
         for lane, ids in names.items():
-            box = QRectF(4, self.places.lane_y(lane) - 13, GUTTER - 12, 26)
+            # Names of thin lanes stand in two columns.
+            aside = 24 * (lane % 2) if self.places.lane_height < 10 else 0
+            box = QRectF(4, self.places.lane_y(lane) - 13, GUTTER - 12 - aside, 26)
             text = painter.fontMetrics().elidedText(
                 " ".join(ids), Qt.TextElideMode.ElideRight, int(box.width())
             )
