@@ -16,11 +16,9 @@ namespace {
 
 std::string text(const std::string& part) {
     using namespace palette4d::gpu;
-    static const std::map<std::string, const char* (*)()> parts = {{"frame", &frame_text},
-                                                                   {"clip", &clip_text},
-                                                                   {"clip_picks", &clip_picks_text},
-                                                                   {"clip_main", &clip_main_text},
-                                                                   {"opencl", &opencl_text}};
+    static const std::map<std::string, const char* (*)()> parts = {
+        {"frame", &frame_text},         {"clip", &clip_text},     {"clip_picks", &clip_picks_text},
+        {"clip_main", &clip_main_text}, {"opencl", &opencl_text}, {"metal", &metal_text}};
     const auto found = parts.find(part);
     if (found == parts.end()) {
         throw py::value_error("part: found '" + part + "'");
@@ -56,8 +54,9 @@ py::tuple table(const std::shared_ptr<const Recolourer>& map, const std::string&
 }  // namespace
 
 void bind_gpu(py::module_& module) {
-    module.def("kernel_text", &text, py::arg("part"),
-               "The GPU kernel's text: 'frame', 'clip', 'clip_picks', 'clip_main' or 'opencl'.");
+    module.def(
+        "kernel_text", &text, py::arg("part"),
+        "The GPU kernel's text: 'frame', 'clip', 'clip_picks', 'clip_main', 'opencl' or 'metal'.");
     module.def("kernel_table", &table, py::arg("map").none(false), py::kw_only(),
                py::arg("output") = "recoloured", py::arg("strength") = 1.0,
                py::arg("keep_lightness") = 0.0, py::arg("lightness") = Vec3{0, 0, 0},

@@ -1,20 +1,11 @@
 // CUDA's driver interface: the host's stream, and pointers of the device in place of pixels.
 #include <algorithm>
 #include <cstdint>
-#include <mutex>
-#include <new>
 #include <utility>
 
 #include "gpu/kept.hpp"
-#include "gpu/library.hpp"
 #include "gpu/queue.hpp"
 #include "gpu/text.hpp"
-
-#if defined(_WIN32)
-#define PALETTE4D_CU __stdcall
-#else
-#define PALETTE4D_CU
-#endif
 
 namespace palette4d::gpu {
 namespace {
@@ -26,56 +17,39 @@ using Pointer = std::uint64_t;
 constexpr int kMostShared = 8;  // CU_FUNC_ATTRIBUTE_MAX_DYNAMIC_SHARED_SIZE_BYTES
 constexpr unsigned kThreads = 128, kRows = 8;
 
-struct CudaFunctions {
-    int(PALETTE4D_CU* cuInit)(unsigned);
-    int(PALETTE4D_CU* cuCtxGetCurrent)(Handle*);
-    int(PALETTE4D_CU* cuCtxGetDevice)(int*);
-    int(PALETTE4D_CU* cuCtxPushCurrent_v2)(Handle);
-    int(PALETTE4D_CU* cuCtxPopCurrent_v2)(Handle*);
-    int(PALETTE4D_CU* cuStreamGetCtx)(Handle, Handle*);
-    int(PALETTE4D_CU* cuDeviceGetName)(char*, int, int);
-    int(PALETTE4D_CU* cuModuleLoadData)(Handle*, const void*);
-    int(PALETTE4D_CU* cuModuleUnload)(Handle);
-    int(PALETTE4D_CU* cuModuleGetFunction)(Handle*, Handle, const char*);
-    int(PALETTE4D_CU* cuFuncSetAttribute)(Handle, int, int);
-    int(PALETTE4D_CU* cuLaunchKernel)(Handle, unsigned, unsigned, unsigned, unsigned, unsigned,
-                                      unsigned, unsigned, Handle, void**, void**);
-    int(PALETTE4D_CU* cuMemAlloc_v2)(Pointer*, std::size_t);
-    int(PALETTE4D_CU* cuMemFree_v2)(Pointer);
-    int(PALETTE4D_CU* cuMemcpyHtoDAsync_v2)(Pointer, const void*, std::size_t, Handle);
-    int(PALETTE4D_CU* cuMemcpyDtoHAsync_v2)(void*, Pointer, std::size_t, Handle);
-    int(PALETTE4D_CU* cuStreamSynchronize)(Handle);
+struct CudaFunctions : Functions {
+    using Functions::Functions;
+    PALETTE4D_FUNCTION(int, cuInit, unsigned);
+    PALETTE4D_FUNCTION(int, cuCtxGetCurrent, Handle*);
+    PALETTE4D_FUNCTION(int, cuCtxGetDevice, int*);
+    PALETTE4D_FUNCTION(int, cuCtxPushCurrent_v2, Handle);
+    PALETTE4D_FUNCTION(int, cuCtxPopCurrent_v2, Handle*);
+    PALETTE4D_FUNCTION(int, cuStreamGetCtx, Handle, Handle*);
+    PALETTE4D_FUNCTION(int, cuDeviceGetName, char*, int, int);
+    PALETTE4D_FUNCTION(int, cuModuleLoadData, Handle*, const void*);
+    PALETTE4D_FUNCTION(int, cuModuleUnload, Handle);
+    PALETTE4D_FUNCTION(int, cuModuleGetFunction, Handle*, Handle, const char*);
+    PALETTE4D_FUNCTION(int, cuFuncSetAttribute, Handle, int, int);
+    PALETTE4D_FUNCTION(int, cuLaunchKernel, Handle, unsigned, unsigned, unsigned, unsigned,
+                       unsigned, unsigned, unsigned, Handle, void**, void**);
+    PALETTE4D_FUNCTION(int, cuMemAlloc_v2, Pointer*, std::size_t);
+    PALETTE4D_FUNCTION(int, cuMemFree_v2, Pointer);
+    PALETTE4D_FUNCTION(int, cuMemAllocHost_v2, void**, std::size_t);
+    PALETTE4D_FUNCTION(int, cuMemFreeHost, void*);
+    PALETTE4D_FUNCTION(int, cuMemcpyHtoDAsync_v2, Pointer, const void*, std::size_t, Handle);
+    PALETTE4D_FUNCTION(int, cuMemcpyDtoHAsync_v2, void*, Pointer, std::size_t, Handle);
+    PALETTE4D_FUNCTION(int, cuStreamSynchronize, Handle);
+    bool usable = complete && cuInit(0) == 0;
     // Since CUDA 11.2, and 12.0: null in older drivers.
-    int(PALETTE4D_CU* cuMemAllocAsync)(Pointer*, std::size_t, Handle);
-    int(PALETTE4D_CU* cuMemFreeAsync)(Pointer, Handle);
-    int(PALETTE4D_CU* cuCtxGetId)(Handle, unsigned long long*);
+    PALETTE4D_FUNCTION(int, cuMemAllocAsync, Pointer*, std::size_t, Handle);
+    PALETTE4D_FUNCTION(int, cuMemFreeAsync, Pointer, Handle);
+    PALETTE4D_FUNCTION(int, cuCtxGetId, Handle, unsigned long long*);
 };
 
 /// Null where CUDA is not here.
 const CudaFunctions* cuda_functions() {
-    static const std::pair<CudaFunctions, bool> loaded = [] {
-        std::pair<CudaFunctions, bool> all{};
-        CudaFunctions& f = all.first;
-        void* const library = load_library({"libcuda.so.1", "libcuda.so", "nvcuda.dll"});
-        if (!library) return all;
-#define PALETTE4D_FIND(name) find_function(library, #name, f.name)
-        all.second = PALETTE4D_FIND(cuInit) && PALETTE4D_FIND(cuCtxGetCurrent) &&
-                     PALETTE4D_FIND(cuCtxGetDevice) && PALETTE4D_FIND(cuCtxPushCurrent_v2) &&
-                     PALETTE4D_FIND(cuCtxPopCurrent_v2) && PALETTE4D_FIND(cuStreamGetCtx) &&
-                     PALETTE4D_FIND(cuDeviceGetName) && PALETTE4D_FIND(cuModuleLoadData) &&
-                     PALETTE4D_FIND(cuModuleUnload) && PALETTE4D_FIND(cuModuleGetFunction) &&
-                     PALETTE4D_FIND(cuFuncSetAttribute) && PALETTE4D_FIND(cuLaunchKernel) &&
-                     PALETTE4D_FIND(cuMemAlloc_v2) && PALETTE4D_FIND(cuMemFree_v2) &&
-                     PALETTE4D_FIND(cuMemcpyHtoDAsync_v2) && PALETTE4D_FIND(cuMemcpyDtoHAsync_v2) &&
-                     PALETTE4D_FIND(cuStreamSynchronize) && f.cuInit(0) == 0;
-        if (!PALETTE4D_FIND(cuMemAllocAsync) || !PALETTE4D_FIND(cuMemFreeAsync)) {
-            f.cuMemAllocAsync = nullptr;
-        }
-        PALETTE4D_FIND(cuCtxGetId);
-#undef PALETTE4D_FIND
-        return all;
-    }();
-    return loaded.second ? &loaded.first : nullptr;
+    static const CudaFunctions all(load_library({"libcuda.so.1", "libcuda.so", "nvcuda.dll"}));
+    return all.usable ? &all : nullptr;
 }
 
 /// The kernel in a context.
@@ -96,28 +70,23 @@ struct Module : Context {
 
 using CudaKey =
     std::pair<Handle, unsigned long long>;  ///< context, and its number where it has one
-struct Modules {
-    std::mutex mutex;
-    Kept<CudaKey, Module> kept;
-};
-/// Never destroyed: at the end of a process the driver may be gone. Modules are not unloaded: they
-/// go with their context, which may be gone too.
-Modules& modules() {
-    alignas(Modules) static unsigned char place[sizeof(Modules)];
-    static auto* const all = new (place) Modules;
-    return *all;
+CudaKey current_context(const CudaFunctions& cu) {
+    CudaKey key{nullptr, 0};
+    if (cu.cuCtxGetCurrent(&key.first)) return {nullptr, 0};
+    if (cu.cuCtxGetId) cu.cuCtxGetId(key.first, &key.second);
+    return key;
 }
+
+/// Modules are not unloaded: they go with their context, which may be gone when they are dropped.
+using Modules = Kept<CudaKey, Module>;
 
 class CudaQueue final : public Queue {
 public:
     CudaQueue(const CudaFunctions& functions, Handle stream, bool waits, Handle context, bool push)
         : cu_(functions), stream_(stream), waits_(waits), push_(push) {
         if (push_) cu_.cuCtxPushCurrent_v2(context);
-        CudaKey key{context, 0};
-        if (cu_.cuCtxGetId) cu_.cuCtxGetId(context, &key.second);
-        Modules& all = modules();
-        const std::lock_guard<std::mutex> lock(all.mutex);
-        module_ = all.kept.get(key, [] { return std::make_shared<Module>(); });
+        key_ = current_context(cu_);
+        module_ = Modules::of_process().get(key_, [] { return std::make_shared<Module>(); });
     }
     ~CudaQueue() override {
         Handle context = nullptr;
@@ -133,21 +102,20 @@ public:
 
     std::string read(const Place& from, std::size_t bytes, int height, char* to,
                      std::ptrdiff_t row) override {
-        return each_row(from, bytes, height, row, [&](Pointer at, std::size_t size, int y) {
-            return cu_.cuMemcpyDtoHAsync_v2(to + row * y, at, size, stream_);
+        return each_row(from, bytes, height, row, [&](std::ptrdiff_t at, std::size_t size, int y) {
+            return cu_.cuMemcpyDtoHAsync_v2(to + row * y, address(from, at), size, stream_);
         });
     }
     std::string write(const char* from, std::ptrdiff_t row, std::size_t bytes, int height,
                       const Place& to) override {
-        return each_row(to, bytes, height, row, [&](Pointer at, std::size_t size, int y) {
-            return cu_.cuMemcpyHtoDAsync_v2(at, from + row * y, size, stream_);
+        return each_row(to, bytes, height, row, [&](std::ptrdiff_t at, std::size_t size, int y) {
+            return cu_.cuMemcpyHtoDAsync_v2(address(to, at), from + row * y, size, stream_);
         });
     }
 
 private:
-    static Pointer address(const Place& place, std::ptrdiff_t row) {
-        return reinterpret_cast<Pointer>(place.data) +
-               static_cast<Pointer>(place.start + place.row * row);
+    static Pointer address(const Place& place, std::ptrdiff_t at) {
+        return reinterpret_cast<Pointer>(place.data) + static_cast<Pointer>(at);
     }
 
     /// Memory of a stream, or of the context in older drivers.
@@ -158,13 +126,13 @@ private:
         int error = 0;
         Memory(const CudaFunctions& functions, std::size_t size, Handle of)
             : cu(functions), stream(of) {
-            error = cu.cuMemAllocAsync ? cu.cuMemAllocAsync(&at, size, stream)
-                                       : cu.cuMemAlloc_v2(&at, size);
+            error = cu.cuMemFreeAsync ? cu.cuMemAllocAsync(&at, size, stream)
+                                      : cu.cuMemAlloc_v2(&at, size);
             if (error) at = 0;
         }
         ~Memory() {
             if (!at) return;
-            if (cu.cuMemAllocAsync) {
+            if (cu.cuMemFreeAsync) {
                 cu.cuMemFreeAsync(at, stream);
             } else {
                 cu.cuMemFree_v2(at);  // waits for what uses it
@@ -174,7 +142,7 @@ private:
         Memory& operator=(const Memory&) = delete;
     };
 
-    Context& context() override { return *module_; }
+    std::shared_ptr<Context> context() override { return module_; }
     std::string load() override { return module_->load(cu_); }
     std::string wait() override {
         const int error = cu_.cuStreamSynchronize(stream_);
@@ -192,7 +160,8 @@ private:
             error = cu_.cuMemcpyHtoDAsync_v2(memory.at + table, frame.grids.data(), grids, stream_);
         }
         if (error) return driver_error("cuMemcpyHtoDAsync", error);
-        Pointer in = address(window.in, 0), out = address(window.out, 0), at = memory.at,
+        Pointer in = address(window.in, window.in.start),
+                out = address(window.out, window.out.start), at = memory.at,
                 grids_at = memory.at + table;
         int size = static_cast<int>(frame.table.size());
         long long in_row = window.in.row / 4, out_row = window.out.row / 4;
@@ -208,23 +177,19 @@ private:
         return waits_ ? wait() : "";
     }
 
-    /// Calls copy(address, bytes, y) for each row, or once where rows have no gaps; then waits.
-    template <class Copy>
-    std::string each_row(const Place& place, std::size_t bytes, int height, std::ptrdiff_t row,
-                         Copy copy) {
-        int error = 0;
-        const bool whole = place.row == row && row > 0 && static_cast<std::size_t>(row) == bytes;
-        const std::size_t size = whole ? bytes * static_cast<std::size_t>(height) : bytes;
-        for (int y = 0; y < (whole ? 1 : height) && !error; ++y) {
-            error = copy(address(place, y), size, y);
-        }
-        const std::string finished = wait();
-        return error ? driver_error("copying pixels", error) : finished;
+    /// Freed while its context is current, or with it.
+    std::shared_ptr<char> pinned(std::size_t bytes) override {
+        void* at = nullptr;
+        if (cu_.cuMemAllocHost_v2(&at, bytes)) return nullptr;
+        return {static_cast<char*>(at), [&cu = cu_, key = key_](char* memory) {
+                    if (current_context(cu) == key) cu.cuMemFreeHost(memory);
+                }};
     }
 
     const CudaFunctions& cu_;
     Handle stream_;
     const bool waits_, push_;
+    CudaKey key_;
     std::shared_ptr<Module> module_;
 };
 
@@ -240,10 +205,6 @@ std::unique_ptr<Queue> cuda_queue(void* stream, bool waits) {
     return std::make_unique<CudaQueue>(*cu, stream, waits, context, push);
 }
 
-void purge_cuda() {
-    Modules& all = modules();
-    const std::lock_guard<std::mutex> lock(all.mutex);
-    all.kept.clear();
-}
+void purge_cuda() { Modules::of_process().clear(); }
 
 }  // namespace palette4d::gpu

@@ -1,10 +1,12 @@
 // What is kept for the contexts of a system: the last ones used, each with the error that ended its
-// use. Not thread-safe.
+// use.
 #pragma once
 
 #include <cstddef>
 #include <list>
 #include <memory>
+#include <mutex>
+#include <new>
 #include <utility>
 
 namespace palette4d::gpu {
@@ -16,9 +18,17 @@ public:
     /// More than a machine has devices.
     static constexpr std::size_t kMost = 8;
 
+    /// Never destroyed: at the end of a process the driver may be gone.
+    static Kept& of_process() {
+        alignas(Kept) static unsigned char place[sizeof(Kept)];
+        static auto* const all = new (place) Kept;
+        return *all;
+    }
+
     /// The key's value, made by make() where there is none.
     template <class Make>
     std::shared_ptr<Value> get(const Key& key, Make make) {
+        const std::lock_guard<std::mutex> lock(mutex_);
         for (auto at = all_.begin(); at != all_.end(); ++at) {
             if (at->first != key) continue;
             all_.splice(all_.begin(), all_, at);
@@ -28,9 +38,13 @@ public:
         if (all_.size() > kMost) all_.pop_back();
         return all_.front().second;
     }
-    void clear() { all_.clear(); }
+    void clear() {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        all_.clear();
+    }
 
 private:
+    std::mutex mutex_;
     std::list<std::pair<Key, std::shared_ptr<Value>>> all_;
 };
 

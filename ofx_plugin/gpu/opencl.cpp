@@ -1,20 +1,11 @@
 // OpenCL 1.1, as hosts have it: their queue, and buffers in place of pixels.
 #include <cstdint>
-#include <mutex>
-#include <new>
 #include <utility>
 #include <vector>
 
 #include "gpu/kept.hpp"
-#include "gpu/library.hpp"
 #include "gpu/queue.hpp"
 #include "gpu/text.hpp"
-
-#if defined(_WIN32)
-#define PALETTE4D_CL __stdcall
-#else
-#define PALETTE4D_CL
-#endif
 
 namespace palette4d::gpu {
 namespace {
@@ -27,56 +18,47 @@ using Handle = void*;
 
 constexpr Uint kQueueContext = 0x1090, kQueueDevice = 0x1091;
 constexpr Uint kDeviceName = 0x102B, kDeviceMaxConstant = 0x1020;
-constexpr Bits kReadOnlyCopied = 1 << 2 | 1 << 5;
+constexpr Bits kReadOnlyCopied = 1 << 2 | 1 << 5, kInHost = 1 << 4, kMapReadWrite = 1 | 1 << 1;
+constexpr Int kInvalidValue = -30;
 
-struct ClFunctions {
-    Int(PALETTE4D_CL* clGetCommandQueueInfo)(Handle, Uint, std::size_t, void*, std::size_t*);
-    Int(PALETTE4D_CL* clGetDeviceInfo)(Handle, Uint, std::size_t, void*, std::size_t*);
-    Handle(PALETTE4D_CL* clCreateProgramWithSource)(Handle, Uint, const char**, const std::size_t*,
-                                                    Int*);
-    Int(PALETTE4D_CL* clBuildProgram)(Handle, Uint, const Handle*, const char*,
-                                      void (*)(Handle, void*), void*);
-    Handle(PALETTE4D_CL* clCreateKernel)(Handle, const char*, Int*);
-    Int(PALETTE4D_CL* clSetKernelArg)(Handle, Uint, std::size_t, const void*);
-    Int(PALETTE4D_CL* clEnqueueNDRangeKernel)(Handle, Handle, Uint, const std::size_t*,
-                                              const std::size_t*, const std::size_t*, Uint,
-                                              const Handle*, Handle*);
-    Handle(PALETTE4D_CL* clCreateBuffer)(Handle, Bits, std::size_t, void*, Int*);
-    Int(PALETTE4D_CL* clEnqueueReadBuffer)(Handle, Handle, Uint, std::size_t, std::size_t, void*,
-                                           Uint, const Handle*, Handle*);
-    Int(PALETTE4D_CL* clEnqueueWriteBuffer)(Handle, Handle, Uint, std::size_t, std::size_t,
-                                            const void*, Uint, const Handle*, Handle*);
-    Int(PALETTE4D_CL* clFlush)(Handle);
-    Int(PALETTE4D_CL* clFinish)(Handle);
-    Int(PALETTE4D_CL* clReleaseMemObject)(Handle);
-    Int(PALETTE4D_CL* clReleaseKernel)(Handle);
-    Int(PALETTE4D_CL* clReleaseProgram)(Handle);
-    Int(PALETTE4D_CL* clRetainContext)(Handle);
-    Int(PALETTE4D_CL* clReleaseContext)(Handle);
+struct ClFunctions : Functions {
+    using Functions::Functions;
+    PALETTE4D_FUNCTION(Int, clGetCommandQueueInfo, Handle, Uint, std::size_t, void*, std::size_t*);
+    PALETTE4D_FUNCTION(Int, clGetDeviceInfo, Handle, Uint, std::size_t, void*, std::size_t*);
+    PALETTE4D_FUNCTION(Handle, clCreateProgramWithSource, Handle, Uint, const char**,
+                       const std::size_t*, Int*);
+    PALETTE4D_FUNCTION(Int, clBuildProgram, Handle, Uint, const Handle*, const char*,
+                       void (*)(Handle, void*), void*);
+    PALETTE4D_FUNCTION(Handle, clCreateKernel, Handle, const char*, Int*);
+    PALETTE4D_FUNCTION(Int, clSetKernelArg, Handle, Uint, std::size_t, const void*);
+    PALETTE4D_FUNCTION(Int, clEnqueueNDRangeKernel, Handle, Handle, Uint, const std::size_t*,
+                       const std::size_t*, const std::size_t*, Uint, const Handle*, Handle*);
+    PALETTE4D_FUNCTION(Handle, clCreateBuffer, Handle, Bits, std::size_t, void*, Int*);
+    PALETTE4D_FUNCTION(Int, clEnqueueReadBuffer, Handle, Handle, Uint, std::size_t, std::size_t,
+                       void*, Uint, const Handle*, Handle*);
+    PALETTE4D_FUNCTION(Int, clEnqueueWriteBuffer, Handle, Handle, Uint, std::size_t, std::size_t,
+                       const void*, Uint, const Handle*, Handle*);
+    PALETTE4D_FUNCTION(void*, clEnqueueMapBuffer, Handle, Handle, Uint, Bits, std::size_t,
+                       std::size_t, Uint, const Handle*, Handle*, Int*);
+    PALETTE4D_FUNCTION(Int, clEnqueueUnmapMemObject, Handle, Handle, void*, Uint, const Handle*,
+                       Handle*);
+    PALETTE4D_FUNCTION(Int, clFlush, Handle);
+    PALETTE4D_FUNCTION(Int, clFinish, Handle);
+    PALETTE4D_FUNCTION(Int, clReleaseMemObject, Handle);
+    PALETTE4D_FUNCTION(Int, clReleaseKernel, Handle);
+    PALETTE4D_FUNCTION(Int, clReleaseProgram, Handle);
+    PALETTE4D_FUNCTION(Int, clRetainCommandQueue, Handle);
+    PALETTE4D_FUNCTION(Int, clReleaseCommandQueue, Handle);
+    PALETTE4D_FUNCTION(Int, clRetainContext, Handle);
+    PALETTE4D_FUNCTION(Int, clReleaseContext, Handle);
 };
 
 /// Null where OpenCL is not here.
 const ClFunctions* cl_functions() {
-    static const std::pair<ClFunctions, bool> loaded = [] {
-        std::pair<ClFunctions, bool> all{};
-        ClFunctions& f = all.first;
-        void* const library = load_library({"libOpenCL.so.1", "libOpenCL.so", "OpenCL.dll",
-                                            "/System/Library/Frameworks/OpenCL.framework/OpenCL"});
-        if (!library) return all;
-#define PALETTE4D_FIND(name) find_function(library, #name, f.name)
-        all.second = PALETTE4D_FIND(clGetCommandQueueInfo) && PALETTE4D_FIND(clGetDeviceInfo) &&
-                     PALETTE4D_FIND(clCreateProgramWithSource) && PALETTE4D_FIND(clBuildProgram) &&
-                     PALETTE4D_FIND(clCreateKernel) && PALETTE4D_FIND(clSetKernelArg) &&
-                     PALETTE4D_FIND(clEnqueueNDRangeKernel) && PALETTE4D_FIND(clCreateBuffer) &&
-                     PALETTE4D_FIND(clEnqueueReadBuffer) && PALETTE4D_FIND(clEnqueueWriteBuffer) &&
-                     PALETTE4D_FIND(clFlush) && PALETTE4D_FIND(clFinish) &&
-                     PALETTE4D_FIND(clReleaseMemObject) && PALETTE4D_FIND(clReleaseKernel) &&
-                     PALETTE4D_FIND(clReleaseProgram) && PALETTE4D_FIND(clRetainContext) &&
-                     PALETTE4D_FIND(clReleaseContext);
-#undef PALETTE4D_FIND
-        return all;
-    }();
-    return loaded.second ? &loaded.first : nullptr;
+    static const ClFunctions all(
+        load_library({"libOpenCL.so.1", "libOpenCL.so", "OpenCL.dll",
+                      "/System/Library/Frameworks/OpenCL.framework/OpenCL"}));
+    return all.complete ? &all : nullptr;
 }
 
 /// The kernel's program for a device of a context.
@@ -107,25 +89,14 @@ struct Program : Context {
 };
 
 using ClKey = std::pair<Handle, Handle>;  ///< context and device
-struct Programs {
-    std::mutex mutex;
-    Kept<ClKey, Program> kept;
-};
-/// Never destroyed: at the end of a process the driver may be gone.
-Programs& programs() {
-    alignas(Programs) static unsigned char place[sizeof(Programs)];
-    static auto* const all = new (place) Programs;
-    return *all;
-}
+using Programs = Kept<ClKey, Program>;
 
 class OpenClQueue final : public Queue {
 public:
     OpenClQueue(const ClFunctions& functions, Handle queue, Handle context, Handle device)
         : cl_(functions), queue_(queue), context_(context), device_(device) {
-        Programs& all = programs();
-        const std::lock_guard<std::mutex> lock(all.mutex);
-        program_ = all.kept.get({context, device},
-                                [&] { return std::make_shared<Program>(cl_, context); });
+        program_ = Programs::of_process().get(
+            {context, device}, [&] { return std::make_shared<Program>(cl_, context); });
     }
 
     std::string device() const override {
@@ -136,16 +107,18 @@ public:
 
     std::string read(const Place& from, std::size_t bytes, int height, char* to,
                      std::ptrdiff_t row) override {
-        return each_row(from, bytes, height, row, [&](std::size_t at, std::size_t size, int y) {
-            return cl_.clEnqueueReadBuffer(queue_, from.data, 0, at, size, to + row * y, 0, nullptr,
-                                           nullptr);
+        return each_row(from, bytes, height, row, [&](std::ptrdiff_t at, std::size_t size, int y) {
+            if (at < 0) return kInvalidValue;
+            return cl_.clEnqueueReadBuffer(queue_, from.data, 0, static_cast<std::size_t>(at), size,
+                                           to + row * y, 0, nullptr, nullptr);
         });
     }
     std::string write(const char* from, std::ptrdiff_t row, std::size_t bytes, int height,
                       const Place& to) override {
-        return each_row(to, bytes, height, row, [&](std::size_t at, std::size_t size, int y) {
-            return cl_.clEnqueueWriteBuffer(queue_, to.data, 0, at, size, from + row * y, 0,
-                                            nullptr, nullptr);
+        return each_row(to, bytes, height, row, [&](std::ptrdiff_t at, std::size_t size, int y) {
+            if (at < 0) return kInvalidValue;
+            return cl_.clEnqueueWriteBuffer(queue_, to.data, 0, static_cast<std::size_t>(at), size,
+                                            from + row * y, 0, nullptr, nullptr);
         });
     }
 
@@ -173,7 +146,7 @@ private:
         }
     };
 
-    Context& context() override { return *program_; }
+    std::shared_ptr<Context> context() override { return program_; }
     std::string load() override { return program_->build(device_); }
     std::string wait() override {
         const Int error = cl_.clFinish(queue_);
@@ -220,20 +193,26 @@ private:
         return error ? driver_error("clFlush", error) : "";
     }
 
-    /// Calls copy(offset, bytes, y) for each row, or once where rows have no gaps; then waits.
-    template <class Copy>
-    std::string each_row(const Place& place, std::size_t bytes, int height, std::ptrdiff_t row,
-                         Copy copy) {
+    /// A mapped buffer, which drivers keep pinned.
+    std::shared_ptr<char> pinned(std::size_t bytes) override {
         Int error = 0;
-        const bool whole = place.row == row && static_cast<std::size_t>(row) == bytes;
-        const std::size_t size = whole ? bytes * static_cast<std::size_t>(height) : bytes;
-        for (int y = 0; y < (whole ? 1 : height) && !error; ++y) {
-            const std::ptrdiff_t at = place.start + place.row * y;
-            if (at < 0) return "a buffer cannot be read before its start";
-            error = copy(static_cast<std::size_t>(at), size, y);
+        const Handle memory = cl_.clCreateBuffer(context_, kInHost, bytes, nullptr, &error);
+        if (!memory) return nullptr;
+        void* const at = cl_.clEnqueueMapBuffer(queue_, memory, 1, kMapReadWrite, 0, bytes, 0,
+                                                nullptr, nullptr, &error);
+        const auto unmap = [&cl = cl_, queue = queue_, memory](void* mapped) {
+            if (mapped) cl.clEnqueueUnmapMemObject(queue, memory, mapped, 0, nullptr, nullptr);
+            cl.clReleaseMemObject(memory);
+        };
+        // To unmap it there must be a queue.
+        if (!at || cl_.clRetainCommandQueue(queue_)) {
+            unmap(at);
+            return nullptr;
         }
-        const std::string finished = wait();
-        return error ? driver_error("copying pixels", error) : finished;
+        return {static_cast<char*>(at), [unmap, &cl = cl_, queue = queue_](char* mapped) {
+                    unmap(mapped);
+                    cl.clReleaseCommandQueue(queue);
+                }};
     }
 
     const ClFunctions& cl_;
@@ -254,10 +233,6 @@ std::unique_ptr<Queue> opencl_queue(void* queue) {
     return std::make_unique<OpenClQueue>(*cl, queue, context, device);
 }
 
-void purge_opencl() {
-    Programs& all = programs();
-    const std::lock_guard<std::mutex> lock(all.mutex);
-    all.kept.clear();
-}
+void purge_opencl() { Programs::of_process().clear(); }
 
 }  // namespace palette4d::gpu

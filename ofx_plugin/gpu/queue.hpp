@@ -6,8 +6,10 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 
 #include "gpu/frame_table.hpp"
+#include "gpu/library.hpp"
 
 namespace palette4d::gpu {
 
@@ -26,10 +28,12 @@ struct Window {
     int x1 = 0, y1 = 0, x2 = 0, y2 = 0;
 };
 
-/// A driver's error in a context. After it the context is not asked again.
+/// What is kept for a context.
 struct Context {
     std::mutex mutex{};
-    std::string problem{};
+    std::string problem{};  ///< a driver's error; after it the kernel is not asked again
+    /// Pinned memory that no render uses, and its bytes: what a frame takes.
+    std::pair<std::shared_ptr<char>, std::size_t> older{}, newer{};
 };
 
 /// For one render, in one thread. Functions return what went wrong, or nothing.
@@ -42,6 +46,9 @@ public:
     /// an error each draw() of this context returns it. With `took` it waits, and sets the
     /// milliseconds of this draw.
     std::string draw(const FrameTable& frame, const Window& window, double* took = nullptr);
+    /// The host's memory for read() and write(): pinned, which copies take a third of the time
+    /// with, where the system has it. The context keeps what one frame takes for the next.
+    std::shared_ptr<char> memory(std::size_t bytes);
     /// Copy `height` rows of `bytes` bytes, from the device to rows of `row` bytes and back. Both
     /// wait until that is done.
     virtual std::string read(const Place& from, std::size_t bytes, int height, char* to,
@@ -50,12 +57,28 @@ public:
                               const Place& to) = 0;
 
 protected:
-    virtual Context& context() = 0;
+    virtual std::shared_ptr<Context> context() = 0;
     /// Makes the kernel ready; under the context's mutex.
     virtual std::string load() = 0;
     virtual std::string enqueue(const FrameTable& frame, const Window& window) = 0;
     /// Until all work is done.
     virtual std::string wait() = 0;
+    /// Null where there is none.
+    virtual std::shared_ptr<char> pinned(std::size_t) { return nullptr; }
+
+    /// Calls copy(offset, bytes, y) for each row, or once where rows have no gaps; then waits.
+    template <class Copy>
+    std::string each_row(const Place& place, std::size_t bytes, int height, std::ptrdiff_t row,
+                         Copy copy) {
+        int error = 0;
+        const bool whole = place.row == row && row > 0 && static_cast<std::size_t>(row) == bytes;
+        const std::size_t size = whole ? bytes * static_cast<std::size_t>(height) : bytes;
+        for (int y = 0; y < (whole ? 1 : height) && !error; ++y) {
+            error = copy(place.start + place.row * y, size, y);
+        }
+        const std::string finished = wait();
+        return error ? driver_error("copying pixels", error) : finished;
+    }
 };
 
 /// A cl_command_queue. Null where OpenCL cannot be loaded.
@@ -63,6 +86,8 @@ std::unique_ptr<Queue> opencl_queue(void* queue);
 /// A CUstream of the current context; null: the default one, and all calls wait. Null where CUDA
 /// cannot be loaded.
 std::unique_ptr<Queue> cuda_queue(void* stream, bool waits);
+/// An id<MTLCommandQueue>. Null where there is no Objective-C.
+std::unique_ptr<Queue> metal_queue(void* queue);
 
 /// Frees what is kept for contexts. Only while no queue is in use.
 void purge();

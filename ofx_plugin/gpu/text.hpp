@@ -13,6 +13,7 @@ const char* clip_picks_text();
 const char* clip_main_text();
 
 const char* opencl_text();
+const char* metal_text();
 /// Compiled from cuda.cu by tools/make_ptx.py.
 const char* cuda_ptx();
 

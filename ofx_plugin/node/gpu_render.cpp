@@ -10,8 +10,14 @@
 namespace palette4d::node {
 namespace {
 
-constexpr const char* kSupported[] = {kOfxImageEffectPropOpenCLRenderSupported,
-                                      kOfxImageEffectPropCudaRenderSupported};
+/// The systems that the node can draw with. Metal was never tried: who tries it says so.
+std::vector<const char*> supported() {
+    std::vector<const char*> all = {kOfxImageEffectPropOpenCLRenderSupported,
+                                    kOfxImageEffectPropCudaRenderSupported};
+    const char* const metal = std::getenv("PALETTE4D_METAL");
+    if (metal && std::string(metal) == "1") all.push_back(kOfxImageEffectPropMetalRenderSupported);
+    return all;
+}
 
 bool is_on(const Properties& arguments, const char* name) {
     return arguments.get_int(name).value_or(0) == 1;
@@ -41,26 +47,28 @@ bool is_float_rgba(const Image& image) {
 }
 
 /// An image of the same kind in memory of the host's, without gaps.
-Image packed(const Image& like, const OfxRectI& bounds, std::vector<char>& memory) {
+Image packed(gpu::Queue& queue, const Image& like, const OfxRectI& bounds,
+             std::shared_ptr<char>& memory) {
     Image image = like;
     image.bounds = bounds;
     const std::size_t row = row_of(bounds, like.pixel_bytes);
     image.row_bytes = static_cast<std::ptrdiff_t>(row);
-    memory.resize(row * static_cast<std::size_t>(static_cast<std::int64_t>(bounds.y2) - bounds.y1));
-    image.data = memory.data();
+    memory = queue.memory(
+        row * static_cast<std::size_t>(static_cast<std::int64_t>(bounds.y2) - bounds.y1));
+    image.data = memory.get();
     return image;
 }
 
 }  // namespace
 
 void describe_gpu(const Properties& node) {
-    for (const char* name : kSupported) node.set_string(name, "true");
+    for (const char* name : supported()) node.set_string(name, "true");
     node.set_string(kOfxImageEffectPropCudaStreamSupported, "true");
 }
 
 bool renders_on_gpus(const Suites& suites) {
     const Properties host(suites, suites.host);
-    for (const char* name : kSupported) {
+    for (const char* name : supported()) {
         if (host.get_string(name) == "true") return true;
     }
     return false;
@@ -87,6 +95,10 @@ GpuRender::GpuRender(const Properties& arguments) {
         enabled = true;
         void* const stream = arguments.get_pointer(kOfxImageEffectPropCudaStream).value_or(nullptr);
         queue = gpu::cuda_queue(stream, !stream);
+    } else if (is_on(arguments, kOfxImageEffectPropMetalEnabled)) {
+        enabled = true;
+        queue = gpu::metal_queue(
+            arguments.get_pointer(kOfxImageEffectPropMetalCommandQueue).value_or(nullptr));
     }
 }
 
@@ -127,20 +139,20 @@ std::string words_of_time(double milliseconds) {
 HostCopy::HostCopy(gpu::Queue& queue, const std::optional<Image>& from) {
     if (!from) return;
     const OfxRectI& bounds = from->bounds;
-    image_ = packed(*from, bounds, memory_);
+    image_ = packed(queue, *from, bounds, memory_);
     whole_ = queue
                  .read(place_of(*from, bounds.x1, bounds.y1), row_of(bounds, from->pixel_bytes),
-                       bounds.y2 - bounds.y1, memory_.data(), image_->row_bytes)
+                       bounds.y2 - bounds.y1, memory_.get(), image_->row_bytes)
                  .empty();
 }
 
 HostWindow::HostWindow(gpu::Queue& queue, const Image& of, const OfxRectI& window)
-    : queue_(queue), to_(of), image_(packed(of, window, memory_)) {}
+    : queue_(queue), to_(of), image_(packed(queue, of, window, memory_)) {}
 
 bool HostWindow::upload() {
     const OfxRectI& window = image_.bounds;
     return queue_
-        .write(memory_.data(), image_.row_bytes, row_of(window, to_.pixel_bytes),
+        .write(memory_.get(), image_.row_bytes, row_of(window, to_.pixel_bytes),
                window.y2 - window.y1, place_of(to_, window.x1, window.y1))
         .empty();
 }

@@ -5,7 +5,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "draw_images.hpp"
 #include "gpu/queue.hpp"
@@ -49,7 +48,7 @@ public:
     const std::optional<Image>& image() const { return image_; }
 
 private:
-    std::vector<char> memory_;
+    std::shared_ptr<char> memory_;
     std::optional<Image> image_;
     bool whole_ = true;
 };
@@ -64,7 +63,7 @@ public:
 private:
     gpu::Queue& queue_;
     const Image to_;
-    std::vector<char> memory_;
+    std::shared_ptr<char> memory_;
     Image image_;
 };
 

@@ -29,6 +29,11 @@
 #define kOfxImageEffectPropCudaEnabled "OfxImageEffectPropCudaEnabled"
 #define kOfxImageEffectPropCudaStream "OfxImageEffectPropCudaStream"
 #endif
+#ifndef kOfxImageEffectPropMetalRenderSupported
+#define kOfxImageEffectPropMetalRenderSupported "OfxImageEffectPropMetalRenderSupported"
+#define kOfxImageEffectPropMetalEnabled "OfxImageEffectPropMetalEnabled"
+#define kOfxImageEffectPropMetalCommandQueue "OfxImageEffectPropMetalCommandQueue"
+#endif
 #ifndef kOfxStatGPURenderFailed
 #define kOfxStatGPURenderFailed ((int)1002)
 #endif

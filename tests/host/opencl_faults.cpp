@@ -73,6 +73,12 @@ long palette4d_faults_alive() { return g_alive; }
         if (is_node(CALLER)) --g_alive;          \
         return real<Int (*)(Handle)>(#name)(of); \
     }
+#define RETAINING(name)                                      \
+    Int name(Handle of) {                                    \
+        if (const int error = refused(CALLER)) return error; \
+        made(CALLER, of);                                    \
+        return real<Int (*)(Handle)>(#name)(of);             \
+    }
 #define MAKING(name, types, names)                               \
     Handle name types {                                          \
         if (const int refusal = refused(CALLER)) {               \
@@ -106,18 +112,18 @@ PASSED(clEnqueueWriteBuffer,
        (Handle to, Handle of, Uint waits, Size from, Size n, const void* data, Uint events,
         const Handle* list, Handle* event),
        (to, of, waits, from, n, data, events, list, event))
+PASSED(clEnqueueUnmapMemObject,
+       (Handle to, Handle of, void* mapped, Uint events, const Handle* list, Handle* event),
+       (to, of, mapped, events, list, event))
 PASSED(clFlush, (Handle of), (of))
 PASSED(clFinish, (Handle of), (of))
-Int clRetainContext(Handle of) {
-    if (const int error = refused(CALLER)) return error;
-    made(CALLER, of);
-    return real<Int (*)(Handle)>("clRetainContext")(of);
-}
+RETAINING(clRetainContext)
+RETAINING(clRetainCommandQueue)
 RELEASING(clReleaseMemObject)
 RELEASING(clReleaseKernel)
 RELEASING(clReleaseProgram)
 RELEASING(clReleaseContext)
-PASSED(clReleaseCommandQueue, (Handle of), (of))
+RELEASING(clReleaseCommandQueue)
 
 MAKING(clCreateContext,
        (const void* properties, Uint n, const Handle* devices, Handle done, Handle data,
@@ -129,6 +135,16 @@ MAKING(clCreateProgramWithSource,
        (Handle of, Uint n, const char** texts, const Size* lengths, Int* error),
        (of, n, texts, lengths, error))
 MAKING(clCreateKernel, (Handle of, const char* name, Int* error), (of, name, error))
+void* clEnqueueMapBuffer(Handle to, Handle of, Uint waits, Bits flags, Size from, Size n,
+                         Uint events, const Handle* list, Handle* event, Int* error) {
+    if (const int refusal = refused(CALLER)) {
+        if (error) *error = refusal;
+        return nullptr;
+    }
+    return real<void* (*)(Handle, Handle, Uint, Bits, Size, Size, Uint, const Handle*, Handle*,
+                          Int*)>("clEnqueueMapBuffer")(to, of, waits, flags, from, n, events, list,
+                                                       event, error);
+}
 MAKING(clCreateBuffer, (Handle of, Bits flags, Size n, void* data, Int* error),
        (of, flags, n, data, error))
 }

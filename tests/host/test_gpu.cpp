@@ -269,3 +269,17 @@ TEST(a_host_without_gpus_has_no_parameter_for_them) {
     CHECK(plugin.describe(kOfxImageEffectContextFilter)
               ->properties.text("OfxImageEffectPropOpenCLRenderSupported") == "true");
 }
+
+#if !defined(_WIN32)
+TEST(metal_is_offered_only_where_that_is_asked_for) {
+    for (const std::string value : {"", "0", "1"}) {
+        setenv("PALETTE4D_METAL", value.c_str(), 1);
+        Plugin plugin{bundle()};
+        plugin.create();
+        const auto node = plugin.describe(kOfxImageEffectContextFilter);
+        const std::string said = node->properties.text("OfxImageEffectPropMetalRenderSupported");
+        CHECK((said == "true") == (value == "1"));
+    }
+    unsetenv("PALETTE4D_METAL");
+}
+#endif

@@ -99,12 +99,15 @@ struct Faulty : Both {
         CHECK(near(layout, output.pixels(layout.bounds), expected));
         return by_kernel();
     }
-    /// The calls of the first renders in a new context.
-    long calls_of_a_first_render() {
+    /// The calls of the first render in a new context, and of one after it.
+    std::pair<long, long> calls_of_renders() {
         const auto fresh = new_context();
         g_faults.set(0, 0, false);
         right(*fresh);
-        return g_faults.calls();
+        const long first = g_faults.calls();
+        g_faults.set(0, 0, false);
+        right(*fresh);
+        return {first, g_faults.calls()};
     }
 };
 
@@ -126,7 +129,7 @@ TEST(gpu_each_call_of_the_driver_refused_in_turn) {
     if (!gpu) return;
     {
         Faulty node(*gpu);
-        const long calls = node.calls_of_a_first_render();
+        const long calls = node.calls_of_renders().first;
         EXPECT(calls > 20, std::to_string(calls));
         long copied = 0, failed = 0;
         for (long call = 1; call <= calls; ++call) {
@@ -162,12 +165,45 @@ TEST(gpu_each_call_of_the_driver_refused_in_turn) {
     CHECK(g_faults.alive() == 0);
 }
 
+TEST(gpu_copies_keep_their_memory_for_the_next_frame) {
+    const auto gpu = new_context();
+    if (!gpu) return;
+    {
+        Faulty node(*gpu);
+        node.set("gpu", 1);
+        const auto [first, next] = node.calls_of_renders();
+        // A buffer, its mapping and its queue, for the source and for the result.
+        EXPECT(first >= next + 2 * 3, std::to_string(first) + " " + std::to_string(next));
+        CHECK(!node.right(*gpu));
+        const long objects = g_faults.alive();
+        for (int i = 0; i < 20; ++i) node.right(*gpu);
+        CHECK(g_faults.alive() == objects);
+        // Each refused: then the memory is ordinary, or there is no picture.
+        long failed = 0;
+        for (long call = 1; call <= first; ++call) {
+            const auto fresh = new_context();
+            Picture output(node.layout);
+            g_faults.set(call, kOutOfMemory, false);
+            const OfxStatus status = node.render(*fresh, output);
+            g_faults.set(0, 0, false);
+            EXPECT(status == kOfxStatOK || status == kGpuFailed, std::to_string(status));
+            failed += status != kOfxStatOK;
+            const auto drawn = output.pixels(node.layout.bounds);
+            CHECK(status != kOfxStatOK || near(node.layout, drawn, node.expected));
+            node.right(*fresh);
+        }
+        // The queue's context and device, two copies and what they wait for.
+        EXPECT(failed <= 6, std::to_string(failed));
+    }
+    CHECK(g_faults.alive() == 0);
+}
+
 TEST(gpu_a_lost_device) {
     const auto gpu = new_context();
     if (!gpu) return;
     {
         Faulty node(*gpu);
-        const long calls = node.calls_of_a_first_render();
+        const long calls = node.calls_of_renders().first;
         for (long call = 1; call <= calls; ++call) {
             const auto fresh = new_context();
             if (call % 2) node.right(*fresh);  // lost at a later frame

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from gpu_needed import lacks
 from numpy.typing import NDArray
 from parity.implementations import Core, Document
 
@@ -26,25 +27,20 @@ def compiler() -> str:
 
 
 @functools.cache
-def library() -> ctypes.CDLL:
+def library(part: str = "frame") -> ctypes.CDLL:
     """The kernel as a library; compiled once in a process."""
+    here = Path(__file__).parent
+    command = [compiler(), "-std=c++17", "-Wextra", here / "kernel.cpp"]
+    if part == "metal":
+        clang = shutil.which("clang++") or lacks("no clang++ (Debian: clang)")
+        # Metal is C++14, and has attributes of its own.
+        command = [clang, "-std=c++14", "-Wno-unknown-attributes", f"-I{here}"]
+        command.append(here / "kernel_metal.cpp")
     with tempfile.TemporaryDirectory() as folder:
         text, made = Path(folder) / "kernel.inc", Path(folder) / "kernel.so"
-        text.write_text(_core.kernel_text("frame"), encoding="utf-8")
-        source = Path(__file__).with_suffix(".cpp")
-        command = [
-            compiler(),
-            "-std=c++17",
-            "-O2",
-            "-Wall",
-            "-Wextra",
-            "-Werror",
-            "-shared",
-            "-fPIC",
-        ]
-        subprocess.run(
-            [*command, f'-DPALETTE4D_KERNEL="{text}"', source, "-o", made], check=True, timeout=120
-        )
+        text.write_text(_core.kernel_text(part), encoding="utf-8")
+        command += ["-O2", "-Wall", "-Werror", "-shared", "-fPIC", f'-DPALETTE4D_KERNEL="{text}"']
+        subprocess.run([*command, "-o", made], check=True, timeout=120)
         return ctypes.CDLL(str(made))
 
 
@@ -56,6 +52,17 @@ def draw(image: F32, recolourer: _core.Recolourer, **options: Any) -> F32:
     pixels, channels = source.size // source.shape[-1], source.shape[-1]
     pointers = [ctypes.c_void_p(a.ctypes.data) for a in (table, grids, source, result)]
     library().draw(*pointers, ctypes.c_long(pixels), ctypes.c_int(channels))
+    return result
+
+
+def draw_by_metal(image: F32, recolourer: _core.Recolourer, **options: Any) -> F32:
+    """What the kernel for Metal draws; the source lacks the first and the last column."""
+    table, grids = _core.kernel_table(recolourer, **options)
+    source = np.ascontiguousarray(image)
+    result = np.empty_like(source)
+    pointers = [ctypes.c_void_p(a.ctypes.data) for a in (table, grids, source, result)]
+    height, width, _ = source.shape
+    library("metal").draw(*pointers, ctypes.c_int(width), ctypes.c_int(height))
     return result
 
 

@@ -23,7 +23,7 @@ from parity.cases import (
     times_of,
 )
 from parity.implementations import CORE, REFERENCE, Core
-from parity.kernel import KERNEL, draw
+from parity.kernel import KERNEL, draw, draw_by_metal
 
 from palette4d import _core
 
@@ -160,6 +160,17 @@ def test_lightness_is_kept_and_the_source_mixed_in_as_in_the_core(premultiplied:
     found = draw(image, recolourer, **options)
     np.testing.assert_allclose(found, expected, **FAST_TOLERANCE)
     assert (found[1:] != image[1:]).any()
+
+
+@pytest.mark.parametrize("name", ["changes", "still-learned"])
+def test_the_kernel_for_metal_draws_the_same(name: str) -> None:
+    recolourer = Core("single").recolourer(DOCUMENTS[name], 7.0)
+    image = picture(4)
+    expected = draw(image, recolourer, premultiplied=True)
+    expected[:, [0, -1]] = 0
+    found = draw_by_metal(image, recolourer, premultiplied=True)
+    np.testing.assert_allclose(found, expected, **FAST_TOLERANCE)
+    assert (found[:, 1:-1] != image[:, 1:-1]).any() == (name != "changes")
 
 
 @pytest.fixture
