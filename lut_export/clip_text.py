@@ -112,11 +112,14 @@ def clip_text(sidecar: _core.Sidecar, frames: str | None, output: object) -> Cli
     text = "\n".join(texts)
     done = ClipText(int(times[0]), int(times[-1]), len(keys), arrays, "\n".join(defines), text)
     if done.size > MOST_BYTES:
-        fewer = ", or switch picks off" if picks is not None else ""
+        found = f"{done.size / 1024:.0f} KB of palette colours and edits"
+        help_ = f"export a range of the clip ({Arg('frames')}), or parts of it to a file each"
+        if picks is not None:
+            # A range has the same grids: it helps with the rest alone.
+            found += f", {picks.size / 1024:.0f} KB of them for picks and holds"
+            help_ = f"switch picks off, or {help_}"
         raise Palette4dError(
-            f"{output}: found {done.size / 1024:.0f} KB of palette colours and edits, and there is "
-            f"room for {MOST_BYTES // 1024} KB: export a range of the clip ({Arg('frames')}), or "
-            f"parts of it to a file each{fewer}"
+            f"{output}: found {found}, and there is room for {MOST_BYTES // 1024} KB: {help_}"
         )
     return done
 
