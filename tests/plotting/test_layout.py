@@ -151,4 +151,8 @@ def test_colours_between_handles_are_the_cores() -> None:
                 assert (before[edge, k] == cut.rgb[index]).all()
                 assert (after[edge, k] == edited[index]).all()
             else:
-                assert (palette.edited[cut.ends[index, 0]] == edited[index]).all()
+                vertex = cut.ends[index, 0]
+                assert (palette.edited[vertex] == edited[index]).all()
+                touching = [e for e, ends in enumerate(palette.edges) if vertex in ends]
+                assert (before[touching, k] == cut.rgb[index]).all()
+                assert (after[touching, k] == edited[index]).all()
