@@ -1,8 +1,11 @@
 """Calls for a child process, in a module that it can import."""
 
 import os
+import pickle
 import time
+from multiprocessing import resource_tracker
 
+from palette4d.common import answers
 from palette4d.common.errors import SidecarError
 
 
@@ -28,3 +31,25 @@ def refuse() -> None:
 
 def fault() -> None:
     raise ZeroDivisionError("by zero")
+
+
+class _Evil:
+    def __init__(self, path: str) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[object, tuple[object, ...]]:
+        return os.mkdir, (self.path,)
+
+
+def take_over(path: str) -> None:
+    """Answer from now on with pickles that make a folder where they are read."""
+    answers.written = lambda value: pickle.dumps((_Evil(path), None))
+
+
+def speak_to_the_tracker() -> bool:
+    """Ask the process that removes shared memory, which is not confined, for something."""
+    try:
+        os.write(resource_tracker._resource_tracker._fd, b"PROBE:0:noop\n")
+    except OSError:
+        return False
+    return True

@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from child_calls import crash, fault, grow, hang, refuse, well
+from child_calls import crash, fault, grow, hang, refuse, speak_to_the_tracker, take_over, well
 from farm_processes import running, wait_for
 from wine import WINE
 
+from palette4d.common import sandbox
 from palette4d.common.child import Child, ChildError
 from palette4d.common.errors import Palette4dError, SidecarError
 
@@ -122,3 +123,22 @@ def test_errors_come_back(child: Child) -> None:
     assert caught.value.pointer == "/clip"
     with pytest.raises(Palette4dError, match="by zero"):
         child.call(fault)
+
+
+def test_an_answer_runs_no_code_here(tmp_path: Path) -> None:
+    """Else a decoder that was taken over would be out of its sandbox."""
+    folder = tmp_path / "made"
+    with Child(20) as child:
+        child.call(take_over, str(folder))
+        with pytest.raises(ChildError, match="take it over"):
+            child.call(well, 1, 2)
+        assert child.call(well, 5, 6)[:2] == (5, 6)
+    assert not folder.exists()
+
+
+@pytest.mark.skipif(bool(sandbox.missing()), reason=sandbox.missing() or "confines")
+def test_a_confined_child_speaks_to_its_parent_alone() -> None:
+    tests = Path(__file__).parents[1]
+    with Child(20) as free, Child(20, reads=[tests]) as confined:
+        assert free.call(speak_to_the_tracker)
+        assert not confined.call(speak_to_the_tracker)

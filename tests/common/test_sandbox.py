@@ -113,6 +113,57 @@ def test_a_reader_that_is_taken_over_can_do_nothing(home: Path, verb: str) -> No
     assert (home / ".bashrc").stat().st_size > 1
 
 
+@confines
+def test_links_of_a_clip_lead_to_clips_alone(home: Path) -> None:
+    """An archive of a stranger may hold links to a key, or to the folder of all."""
+    store = home / "store"
+    store.mkdir()
+    frame = (home / "clip" / "frame.0005.png").rename(store / "frame.png")
+    (home / "clip" / "frame.0005.png").symlink_to(frame)
+    for name, target in (("key.png", ".ssh/id_rsa"), ("all.png", "."), ("up.p4d.json", ".")):
+        (home / "clip" / name).symlink_to(home / target)
+    shutil.copyfile(GOLDEN / "v2_picks.p4d.json", home / "clip" / "own.p4d.json")
+    files = ["clip/own.p4d.json", "clip/frame.####.png"]
+    done = command(home, "render", *files, "-o", "o.####.exr")
+    assert done.returncode == 0, done.stderr
+    assert told(done) == [[]]
+    assert len(list(home.glob("o.*.exr"))) == 6
+
+
+@confines
+def test_without_landlock_5_no_process_is_signalled() -> None:
+    """Before Linux 6.12 the filter of calls alone keeps signals and limits from others."""
+    program = (
+        "import os, resource, signal\n"
+        "from palette4d.common import sandbox\n"
+        "sandbox._libc().prctl(38, 1, 0, 0, 0)\n"
+        "sandbox._filter_calls(False)\n"
+        "signal.signal(signal.SIGUSR1, lambda *_: print('own'))\n"
+        "signal.raise_signal(signal.SIGUSR1)\n"
+        "resource.setrlimit(resource.RLIMIT_CORE, (0, 0))\n"
+        "other = os.getppid()\n"
+        "for ask in (lambda: os.kill(other, 0), lambda: resource.prlimit(other, 4)):\n"
+        "    try:\n"
+        "        print(ask())\n"
+        "    except PermissionError:\n"
+        "        print('refused')\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", program], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["own", "refused", "refused"]
+
+
+@confines
+@pytest.mark.parametrize("name", ["grade", ".hidden", "grade.of.a.shot"])
+def test_the_file_that_was_named_is_written_whatever_its_name(home: Path, name: str) -> None:
+    words = f"analyze clip/ -o {name} --quiet --sandbox on".split()
+    done = [command(home, *words, hostile=False) for _ in range(2)]
+    assert [one.returncode for one in done] == [0, 0], done[0].stderr
+    assert json.loads((home / name).read_text())["schema"] == "palette4d.sidecar"
+    assert command(home, "info", name, hostile=False).returncode == 0
+
+
 def test_where_the_kernel_cannot_on_is_an_error_and_auto_goes_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

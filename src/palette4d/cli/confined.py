@@ -80,13 +80,14 @@ def _needs(args: argparse.Namespace) -> Needs | None:
 
 def _of_analysis(args: argparse.Namespace) -> Needs | None:
     from palette4d.colour.ocio_config import files_of_config
+    from palette4d.media.clip_files import SIDECARS
     from palette4d.shows.timeline_files import is_timeline
 
     if is_timeline(args.clip):
         return None  # child processes open all media
     output = Path(args.output)
     files = files_of_config(args.ocio_config or os.environ.get("OCIO") or "")
-    files += sandbox.parts(output if args.detect_shots else output.parent, {"json"})
+    files += [output, *sandbox.parts(output if args.detect_shots else output.parent, SIDECARS)]
     files += [] if args.like is None else [args.like]
     if args.detect_shots:
         return Needs(Promise(output, ".json", below=True), [], args.clip, files, starts=True)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
-import pickle
 import signal
 import sys
 import tempfile
@@ -21,7 +20,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
 
-from palette4d.common import files, sandbox
+from palette4d.common import answers, files, sandbox
 from palette4d.common.errors import Palette4dError, in_words
 
 if sys.platform == "win32":
@@ -115,8 +114,8 @@ class Child:
             if not self._pipe.poll(self.seconds):
                 self.close()
                 raise ChildError(f"reading it takes longer than {self.seconds:g} seconds")
-            result, problem = self._pipe.recv()
-        except (EOFError, BrokenPipeError, ConnectionResetError) as error:
+            data = self._pipe.recv_bytes(answers.LARGEST)
+        except (EOFError, OSError) as error:
             self._process.join(GRACE)
             status = self._process.exitcode
             self.close()
@@ -124,7 +123,12 @@ class Child:
         except BaseException:  # Ctrl-C: the answer must not be taken for the next one
             self.close()
             raise
-        if problem is MemoryError:
+        try:
+            result, problem = answers.read(data)
+        except Palette4dError as error:
+            self.close()
+            raise ChildError(str(error)) from error
+        if isinstance(problem, MemoryError):
             self.close()
             raise ChildError(f"reading it takes more than {self.megabytes} MB of memory")
         if problem is not None:
@@ -223,6 +227,8 @@ def _serve(
         reads, folder = confined
         tempfile.tempdir = str(folder)
         sandbox.confine(reads, [folder])
+        if (tracker := resource_tracker.getfd()) is not None:
+            os.close(tracker)  # unconfined, it removes shared memory of any name
     if megabytes is not None:
         _limit(megabytes)
     while True:
@@ -233,14 +239,14 @@ def _serve(
         if seconds is not None and hasattr(signal, "alarm"):
             signal.alarm(int(seconds + GRACE))  # where the parent was killed, nobody else ends it
         try:
-            answer = pickle.dumps((function(*arguments), None))
+            answer = answers.written((function(*arguments), None))
         except MemoryError:
-            answer = pickle.dumps((None, MemoryError))
+            answer = answers.written((None, MemoryError()))
         except Palette4dError as error:
-            answer = pickle.dumps((None, error))
+            answer = answers.written((None, error))
         except Exception as error:  # anything may come of a hostile file
             problem = Palette4dError(in_words(error) or type(error).__name__)
-            answer = pickle.dumps((None, problem))
+            answer = answers.written((None, problem))
         if hasattr(signal, "alarm"):
             signal.alarm(0)
         pipe.send_bytes(answer)

@@ -123,11 +123,12 @@ def confine(
 
 
 def parts(folder: Path, extensions: Collection[str]) -> Iterator[Path]:
-    """Yield what to read for the files of a folder that have an extension.
+    """Yield what to read for the files of a folder that have an extension, such as "p4d.json".
 
-    That is the folder, with what its links lead to. Of the home folder, one above it and a hidden
-    one it is the files alone: ``.ssh`` lies beside them.
+    That is the folder, with the files of these extensions that its links lead to. Of the home
+    folder, one above it and a hidden one it is the files alone: ``.ssh`` lies beside them.
     """
+    endings = tuple(f".{extension}" for extension in extensions)
     whole = not holds_home(folder) and not any(
         part.startswith(".") for part in Path(os.path.realpath(folder)).parts
     )
@@ -135,12 +136,11 @@ def parts(folder: Path, extensions: Collection[str]) -> Iterator[Path]:
         yield folder
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
-            if (entry.is_symlink() or not whole) and _extension(entry.name) in extensions:
-                yield Path(entry)
-
-
-def _extension(name: str) -> str:
-    return name.rpartition(".")[2].lower()
+            if entry.is_symlink() or not whole:
+                found = Path(os.path.realpath(entry))  # a link may lead to a key, or to a folder
+                alike = all(name.lower().endswith(endings) for name in (entry.name, found.name))
+                if alike and not found.is_dir():
+                    yield found
 
 
 def holds_home(folder: Path) -> bool:
@@ -168,6 +168,10 @@ def _program(starts: bool) -> list[tuple[int, int, int, int]]:
     for name in REFUSED if starts else (*REFUSED, *STARTS):
         if (call := number(name)) >= 0:
             steps += [(_EQUAL, 0, 1, call), deny]
+    if not starts:  # before Linux 6.12 Landlock has no word on signals
+        for name, own in (("tgkill", os.getpid()), ("prlimit64", 0)):
+            steps += [(_EQUAL, 0, 4, number(name)), (_LOAD, 0, 0, 16), (_EQUAL, 1, 0, own), deny]
+            steps += [(_LOAD, 0, 0, 0)]
     steps += [
         *((_EQUAL, 0, 3, number("clone")), (_LOAD, 0, 0, 16), (_ANY_BIT, 0, 1, _NEW_NAMESPACES)),
         *(deny, (_LOAD, 0, 0, 0)),

@@ -17,9 +17,17 @@ _NUMBERS = {
     "clone": (56, 220),
     "clone3": (435, 435),
     "ioctl": (16, 29),
-    # programs
+    # with a process of one's own as the first argument
+    "tgkill": (234, 131),
+    "prlimit64": (302, 261),
+    # programs and signals
     "execve": (59, 221),
     "execveat": (322, 281),
+    "kill": (62, 129),
+    "tkill": (200, 130),
+    "rt_sigqueueinfo": (129, 138),
+    "rt_tgsigqueueinfo": (297, 240),
+    "pidfd_send_signal": (424, 424),
     # network, and ways around the filter
     "socket": (41, 198),
     "connect": (42, 203),
@@ -98,11 +106,13 @@ _NUMBERS = {
     "syslog": (103, 116),
 }
 
-#: What starts a program.
-STARTS = ("execve", "execveat")
+_NAMES = tuple(_NUMBERS)
+
+#: What starts a program, or ends one: for processes that start some.
+STARTS = _NAMES[_NAMES.index("execve") : _NAMES.index("socket")]
 
 #: What no confined process may do.
-REFUSED = tuple(_NUMBERS)[tuple(_NUMBERS).index("socket") :]
+REFUSED = _NAMES[_NAMES.index("socket") :]
 
 
 def number(name: str) -> int:

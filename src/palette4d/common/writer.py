@@ -35,7 +35,7 @@ class Promise:
     folder : with its files; it need not exist yet.
     ending : of their names.
     below : whether folders in it belong to it.
-    linked : the one other file that may be written, to which a link leads.
+    linked : the file itself, or that to which it is a link, whatever its name.
     """
 
     folder: Path
@@ -54,11 +54,12 @@ class Promise:
 
     def holds(self, path: Path) -> bool:
         """Whether a file's path is among those that were promised."""
+        if self.linked is not None and path == self.linked.absolute():
+            return True
         if path.name.startswith(".") or not path.name.endswith(self.ending):
             return False
         own, there = os.path.realpath(self.folder), Path(os.path.realpath(path.parent))
-        near = there.is_relative_to(own) if self.below else str(there) == own
-        return near or (self.linked is not None and path == self.linked.absolute())
+        return there.is_relative_to(own) if self.below else str(there) == own
 
     def leads_to(self, folder: Path) -> bool:
         """Whether a folder may be made: this one, one on the way to it, or one in it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,12 +12,16 @@ from palette4d.media.clip_sequence import IMAGE_EXTENSIONS, MOVIE_EXTENSIONS, ex
 from palette4d.media.reading import split
 from palette4d.media.source_clip import candidates
 
+#: How the names of files end that belong to a sidecar.
+SIDECARS = frozenset({"p4d.json", "shots.json"})
+
 
 def files_of(spec: str) -> Iterator[Path]:
     """Yield what a confined process must read to open a clip, by its name for `open_clip`."""
     path = Path(spec if Path(spec).exists() else split(spec)[0])
     if path.is_file() and extension(path) in MOVIE_EXTENSIONS:
-        yield path
+        if extension(Path(os.path.realpath(path))) in MOVIE_EXTENSIONS:  # not a link to a key
+            yield path
     else:
         yield from sandbox.parts(path if path.is_dir() else path.parent, IMAGE_EXTENSIONS)
 
@@ -30,7 +35,7 @@ def files_of_sidecar(path: Path, clip: str | None = None) -> Iterator[Path]:
         The file is no sidecar.
     """
     yield path
-    yield from sandbox.parts(path.parent, {"json"})
+    yield from sandbox.parts(path.parent, SIDECARS)
     source = str(_core.read_sidecar(str(path)).clip["source"])
     for spec in candidates(path, source) if clip is None else [clip]:
         yield from files_of(spec)
