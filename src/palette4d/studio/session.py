@@ -15,6 +15,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TypeVar
 
+import fileseq  # noqa: F401  before threads: it fails where two of them import it at once
+
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.folders import state_folder
 from palette4d.grade import edits
