@@ -51,7 +51,8 @@ CXX_FILES = $(shell find ofx_plugin tests -name '*.cpp' -o -name '*.hpp' -o -nam
 
 .PHONY: help demo studio docs-images test test-all install dev wheel lint style types build-cpp build-sanitize build-threads \
 	build-fuzz test-cpp test-sanitize test-threads test-threads-short test-fuzz test-py format clean \
-	compiler fuzz-compiler fuzz-coverage audit sbom lock test-reproducible bundles bundles-again test-bundles wheels
+	compiler fuzz-compiler fuzz-coverage audit sbom lock test-reproducible bundles bundles-again test-bundles wheels \
+	test-windows
 
 help: ## this list
 	@echo "make demo            from nothing to results in demo_output/"
@@ -74,6 +75,7 @@ help: ## this list
 	@echo "make bundles-again   the same in another folder: the bytes must be equal"
 	@echo "make test-bundles    its libraries, natively, under Wine and qemu"
 	@echo "make wheels          wheels for each Python 3.11 to 3.13 on PATH, with that bundle, in $(RELEASE)/wheels/"
+	@echo "make test-windows    the wheel for Windows (make wheels) under Wine, with Windows' own CPython"
 	@echo "make test-py         pytest on the wheel in a fresh environment (PYTEST_ARGS=... is passed on)"
 	@echo "make format          rewrite the sources as ruff and clang-format want them"
 	@echo "make docs-images     draw the pictures of the docs again, from the demo"
@@ -203,11 +205,16 @@ lock: $(SUPPLY)/.installed ## the newest versions of all that make downloads, pi
 	of native lint; compile tools $(SUPPLY)/in.txt -c locks/test.txt; \
 	of native release; compile release $(SUPPLY)/in.txt -c locks/build.txt; \
 	of bundle-test; compile bundle-test $(SUPPLY)/in.txt; \
-	of supply; compile supply $(SUPPLY)/in.txt
+	of supply; compile supply $(SUPPLY)/in.txt; \
+	of windows-test; grep ^numpy $(SUPPLY)/in.txt > $(SUPPLY)/override.txt; echo "== locks/windows-test.txt"; \
+	$(SUPPLY)/bin/uv pip compile --quiet --upgrade --python-platform windows --python-version 3.11 \
+		--generate-hashes --no-annotate --no-emit-index-url --no-emit-find-links \
+		--custom-compile-command "make lock" --override $(SUPPLY)/override.txt \
+		$(SUPPLY)/in.txt -o locks/windows-test.txt
 
-# PyPI answers; what palette4d itself compiles in stands in the wheel's own list.
+# PyPI answers; what Wine needs is old, and stays in Wine. What palette4d itself compiles in stands in the wheel's own list.
 audit: $(SUPPLY)/.installed ## known faults of all that is pinned (asks PyPI)
-	@for lock in $(wildcard locks/*.txt); do \
+	@for lock in $(filter-out locks/windows-test.txt,$(wildcard locks/*.txt)); do \
 		echo "== $$lock"; $(SUPPLY)/bin/pip-audit --require-hashes --disable-pip -r $$lock || exit; \
 	done
 
@@ -265,6 +272,7 @@ test-all: ## everything, before a release
 	$(MAKE) SLOW=1 test test-threads wheel test-reproducible
 	$(MAKE) FUZZ_SECONDS=600 test-fuzz fuzz-coverage audit
 	$(MAKE) bundles-again test-bundles wheels
+	$(MAKE) test-windows
 	@echo "== all of make test-all passed"
 
 wheel: build/wheel.stamp ## the wheel
@@ -411,6 +419,16 @@ test-bundles: $(BUNDLES)/SHA256SUMS-bundle $(TEST_VENV)/.installed
 # A wheel for each Python on PATH, repaired, checked, and run through the demo in a bare environment.
 wheels: $(BUNDLES)/SHA256SUMS-bundle ## wheels that need no compiler
 	@export $(RELEASE_ENVIRONMENT) && tools/wheels.sh $(RELEASE) "$(CURDIR)/$(BUNDLES)/Palette4D.ofx.bundle"
+
+# Wine runs CPython's own build for Windows, and in it that wheel; the tests compare it with Linux.
+WINDOWS_WHEEL ?= $(RELEASE)/wheels/palette4d-*-cp311-cp311-win_amd64.whl
+test-windows: $(TEST_VENV)/.installed $(RELEASE)/.installed ## the wheel for Windows, under Wine
+	@PATH="$(CURDIR)/$(RELEASE)/env/bin:$$PATH" \
+		tools/windows_python.sh "$(CURDIR)/$(RELEASE)/wine" "$$(echo $(WINDOWS_WHEEL))"
+	@rm -rf build/test-run && mkdir -p build/test-run && cd build/test-run && \
+		PALETTE4D_WINDOWS="$(CURDIR)/$(RELEASE)/wine" "$(CURDIR)/$(TEST_VENV)/bin/python" -P -m pytest \
+		-c "$(CURDIR)/pyproject.toml" --rootdir "$(CURDIR)" "$(CURDIR)/tests/windows" \
+		-o faulthandler_timeout=1800 $(PYTEST_ARGS)
 
 format: $(TOOLS)/.installed ## rewrite the sources as ruff and clang-format want them
 	$(TOOLS)/bin/ruff check --fix .

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 constexpr const char* kRemedy = "; run 'palette4d install-plugin' again in a terminal";
 constexpr const char* kMissing =
     "found no such file, so no palette4d is known to this node; install "
-    "palette4d and run 'palette4d install-plugin' in a terminal (Linux only so far)";
+    "palette4d and run 'palette4d install-plugin' in a terminal";
 
 #if !defined(_WIN32)
 bool ours(uid_t owner) { return owner == 0 || owner == ::geteuid(); }
