@@ -421,7 +421,7 @@ def test_the_list_switches_off_selects_and_removes(qtbot: Any, opened: Window) -
     assert item is not None
     assert item.text(0).startswith("p1")
     item.setCheckState(0, Qt.CheckState.Unchecked)
-    assert not picks(opened)[0].enabled
+    qtbot.waitUntil(lambda: not picks(opened)[0].enabled)
     opened.session.undo()
     assert picks(opened)[0].enabled
     opened.session.select("p1")

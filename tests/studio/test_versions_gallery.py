@@ -114,10 +114,12 @@ def test_a_name_is_typed_in_its_place(gallery: Gallery, opened: Window, qtbot: A
     assert opened.session.view.version == "warm"
 
 
-def test_a_name_that_another_version_has_is_refused(gallery: Gallery, opened: Window) -> None:
+def test_a_name_that_another_version_has_is_refused(
+    gallery: Gallery, opened: Window, qtbot: Any
+) -> None:
     gallery.list.item(0).setText("B")
+    qtbot.waitUntil(lambda: names(gallery) == ["A", "B"])
     assert opened.session.status.level == "error"
-    assert names(gallery) == ["A", "B"]
 
 
 def test_a_note_stands_below_the_name(gallery: Gallery, opened: Window) -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import QIcon, QKeyEvent, QPainter, QPixmap
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -126,7 +126,8 @@ class PickList(QWidget):
         if self._silent:
             return
         id_, on = item.data(0, ID), item.checkState(0) == Qt.CheckState.Checked
-        grade_steps.enable(self.session, id_, on)
+        # Later: the list is built anew by it, and Qt still uses the item that tells of its change.
+        QTimer.singleShot(0, self, lambda: grade_steps.enable(self.session, id_, on))
 
     def remove_selected(self) -> None:
         """Remove the selected picks and holds, and unlock the selected handles."""

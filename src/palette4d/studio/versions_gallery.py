@@ -184,10 +184,14 @@ class Gallery(QWidget):
         grade_steps.remove_versions(self.session, self.chosen)
 
     def _renamed(self, item: QListWidgetItem) -> None:
-        name = item.data(NAME)
-        if not self._silent and item.text() != name:
-            grade_steps.rename_version(self.session, name, item.text())
-            self.refresh()
+        old, new = item.data(NAME), item.text()
+        if not self._silent and new != old:
+            # Later: the list is built anew by it, and Qt still uses the item that was renamed.
+            QTimer.singleShot(0, self, lambda: self._rename(old, new))
+
+    def _rename(self, old: str, new: str) -> None:
+        grade_steps.rename_version(self.session, old, new)
+        self.refresh()
 
     def _note_typed(self) -> None:
         chosen = self.chosen
