@@ -185,8 +185,17 @@ py::list versions_of(const py::object& bound) {
     return result;
 }
 
+/// A file's name as UTF-8: bytes that are none, which Python has as surrogates, become escapes.
+std::string utf8_of(const py::str& name) {
+    const auto bytes = py::reinterpret_steal<py::bytes>(
+        PyUnicode_AsEncodedString(name.ptr(), "utf-8", "backslashreplace"));
+    if (!bytes) throw py::error_already_set();
+    return bytes;
+}
+
 std::unique_ptr<BoundSidecar> with_members(const BoundSidecar& self, const py::dict& edits,
-                                           const py::object& mattes, const std::string& name) {
+                                           const py::object& mattes, const py::str& called) {
+    const std::string name = utf8_of(called);
     const Json own = json_from(edits, name);
     const Json grids = mattes.is_none() ? Json{{"grids", Json::object()}} : json_from(mattes, name);
     const py::gil_scoped_release unlocked;
@@ -194,8 +203,8 @@ std::unique_ptr<BoundSidecar> with_members(const BoundSidecar& self, const py::d
 }
 
 /// The core's view of a text, and its members for Python.
-py::tuple decode(const py::object& text, const std::string& name) {
-    const std::string bytes = text_bytes(text);
+py::tuple decode(const py::object& text, const py::str& called) {
+    const std::string bytes = text_bytes(text), name = utf8_of(called);
     Json tree;
     std::unique_ptr<BoundSidecar> sidecar;
     {
@@ -207,7 +216,8 @@ py::tuple decode(const py::object& text, const std::string& name) {
 }
 
 /// The core's view of members, and their text.
-py::tuple encode(const py::object& members, const std::string& name) {
+py::tuple encode(const py::object& members, const py::str& called) {
+    const std::string name = utf8_of(called);
     const Json tree = json_from(members, name);
     std::unique_ptr<BoundSidecar> sidecar;
     std::string text;
@@ -301,15 +311,17 @@ void bind_sidecar(py::module_& module) {
         py::arg("path"), "Read and validate a sidecar file; SidecarError when it is unusable.");
     module.def(
         "parse_sidecar",
-        [](const py::object& text, const std::string& name) {
-            const std::string bytes = text_bytes(text);
+        [](const py::object& text, const py::str& called) {
+            const std::string bytes = text_bytes(text), name = utf8_of(called);
             py::gil_scoped_release unlocked;
             return bound(palette4d::parse_sidecar(bytes, name));
         },
         py::arg("text"), py::arg("name") = "<text>",
         "The same for text (str or bytes) in memory; `name` replaces the file name in errors.");
-    module.def("clip_name", &palette4d::clip_name, py::arg("file_name"),
-               "A media file's name without extension and frame number: that of its sidecar.");
+    module.def(
+        "clip_name", [](const py::str& name) { return palette4d::clip_name(utf8_of(name)); },
+        py::arg("file_name"),
+        "A media file's name without extension and frame number: that of its sidecar.");
     module.attr("LONGEST_NAME") = palette4d::kLongestName;
     module.def(
         "file_safe", &palette4d::file_safe, py::arg("name"),

@@ -35,6 +35,18 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
+def test_names_that_are_no_utf_8(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    named = tmp_path / os.fsdecode(b"b\xe9.p4d.json")
+    named.write_bytes(Path(EDITED).read_bytes())
+    assert main.main(["info", str(named)]) == 0
+    assert main.main(["edit", str(named), "undo"]) in (0, 1)
+    named.write_bytes(b"{")
+    capsys.readouterr()
+    assert main.main(["info", str(named)]) == 1
+    assert "b\\udce9.p4d.json: " in capsys.readouterr().err
+
+
 def test_a_palette_is_computed_once_for_all_tracks(monkeypatch: pytest.MonkeyPatch) -> None:
     document = Document.load(EDITED)
     frames: list[float] = []

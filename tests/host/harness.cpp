@@ -389,10 +389,11 @@ int stand_in(const std::vector<std::string>& words) {
 
 /// palette4d_host_tests BUNDLE FOLDER [NAME …] [-NAME …] [odd|even]: runs the tests whose names
 /// contain one of NAME (all without one), and none of -NAME; with odd or even every second of them.
-// What LeakSanitizer must not count: OpenCL on a processor keeps its compiler's memory.
+// What LeakSanitizer must not count: OpenCL on a processor keeps its compiler's memory, Objective-C
+// its classes.
 extern "C" const char* __lsan_default_suppressions();
 extern "C" __attribute__((visibility("default"))) const char* __lsan_default_suppressions() {
-    return "leak:libpocl\nleak:libLLVM\nleak:libOpenCL\n";
+    return "leak:libpocl\nleak:libLLVM\nleak:libOpenCL\nleak:libobjc\n";
 }
 
 int main(int argc, char** argv) {

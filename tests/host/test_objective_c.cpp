@@ -58,8 +58,9 @@ TEST(objective_c_messages) {
     add("code", &answer, "q@:");
     reinterpret_cast<void (*)(Handle)>(get("objc_registerClassPair"))(kind);
     CHECK(objc.objc_getClass("Palette4DListener") == kind);
-    const Handle listener =
-        reinterpret_cast<Handle (*)(Handle, std::size_t)>(get("class_createInstance"))(kind, 0);
+    // A class without a root has no room for the pointer to its class: it gets it here.
+    const Handle listener = reinterpret_cast<Handle (*)(Handle, std::size_t)>(
+        get("class_createInstance"))(kind, sizeof(Handle));
 
     objc.send<void>(listener, "dispatchThreadgroups:threadsPerThreadgroup:", Three{1, 2, 3},
                     Three{4, 5, 6});
@@ -74,4 +75,5 @@ TEST(objective_c_messages) {
     CHECK(error == &g_heard);
     CHECK(objc.send<long>(listener, "code") == -7);
     CHECK(objc.send<long>(nullptr, "code") == 0);
+    reinterpret_cast<Handle (*)(Handle)>(get("object_dispose"))(listener);
 }

@@ -25,7 +25,7 @@ def name_of(sidecar: str | os.PathLike[str]) -> str:
     """Return the socket's name for a sidecar."""
     user = os.getuid() if hasattr(os, "getuid") else 0
     key = f"{user} {os.path.realpath(sidecar)}"
-    return f"palette4d-studio-{hashlib.sha256(key.encode()).hexdigest()[:20]}"
+    return f"palette4d-studio-{hashlib.sha256(os.fsencode(key)).hexdigest()[:20]}"
 
 
 def bring_forward(sidecar: str | os.PathLike[str], frame: float | None) -> bool:

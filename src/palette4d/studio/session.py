@@ -452,7 +452,7 @@ class Session(Drafts):
 
 def recovery_files(sidecar: Path) -> Iterator[Path]:
     """Yield where edits are kept when the sidecar cannot be written: each session takes another."""
-    name = hashlib.sha256(os.path.realpath(sidecar).encode()).hexdigest()[:12]
+    name = hashlib.sha256(os.fsencode(os.path.realpath(sidecar))).hexdigest()[:12]
     folder = state_folder() / "palette4d" / "recovery"
     # At most 255 bytes: two names may begin alike, their hashes do not.
     short = os.fsencode(sidecar.name)[-200:].decode("utf-8", "ignore")
