@@ -116,7 +116,7 @@ def test_a_lock_file_of_a_dead_process_is_removed(
     )
     assert left.returncode == 0
     lock = tmp_path / ".clip.p4d.json.lock"
-    assert lock.exists()
+    computer = lock.read_text().split()[0]
     # Also one of a file that nobody writes again; those of other programs stay.
     lock.with_name(".other.p4d.json.lock").write_text(lock.read_text())
     foreign = lock.with_name(".foreign.lock")
@@ -127,13 +127,14 @@ def test_a_lock_file_of_a_dead_process_is_removed(
     document.save()
     foreign.unlink()
     assert [file.name for file in tmp_path.iterdir()] == ["clip.p4d.json"]
-    # The lock of a computer that cannot be asked is respected.
-    lock.write_text("elsewhere 1 abc")
+    # The lock of a computer that cannot be asked is respected, and one that names no process.
     document.set("v1", rgb=(0.6, 0.5, 0.5))
     before = path.read_bytes()
-    with pytest.raises(Palette4dError, match=r"elsewhere.*\.lock"):
-        document.save()
-    assert path.read_bytes() == before
+    for owner in ("elsewhere 1 abc", f"{computer} ² abc"):
+        lock.write_text(owner, encoding="utf-8")
+        with pytest.raises(Palette4dError, match=r"\.lock"):
+            document.save()
+        assert path.read_bytes() == before
     lock.unlink()
     document.save()
 

@@ -145,7 +145,7 @@ def _is_dead(owner: str) -> bool:
     """Whether the owner ran on this computer and has ended."""
     computer, _, rest = owner.partition(" ")
     pid = rest.partition(" ")[0]
-    if computer != _computer() or not pid.isdigit():
+    if computer != _computer() or not pid.isdecimal():
         return False
     if sys.platform == "win32":  # there os.kill() ends a process, whatever the signal
         return windows.has_ended(int(pid))
