@@ -318,10 +318,8 @@ void bind_sidecar(py::module_& module) {
         },
         py::arg("text"), py::arg("name") = "<text>",
         "The same for text (str or bytes) in memory; `name` replaces the file name in errors.");
-    module.def(
-        "clip_name", [](const py::str& name) { return palette4d::clip_name(utf8_of(name)); },
-        py::arg("file_name"),
-        "A media file's name without extension and frame number: that of its sidecar.");
+    module.def("clip_name", &palette4d::clip_name, py::arg("file_name"),
+               "A media file's name without extension and frame number: that of its sidecar.");
     module.attr("LONGEST_NAME") = palette4d::kLongestName;
     module.def(
         "file_safe", &palette4d::file_safe, py::arg("name"),
