@@ -168,7 +168,7 @@ TARGETS = {
 }
 
 
-def many(kind: str, seed: str, first: int, count: int, folder: Path) -> collections.Counter[str]:
+def many(kind: str, seed: str, first: int, count: int, folder: Path) -> dict[str, int]:
     """Give a target the inputs of these numbers; return how many were accepted and refused.
 
     The file `number` in the folder holds the number of the input that is tried.
@@ -192,7 +192,7 @@ def many(kind: str, seed: str, first: int, count: int, folder: Path) -> collecti
         assert time.process_time() - start < 5, f"input {number} took too long: {data!r}"
         outcomes[outcome] += 1
     os.close(told)
-    return outcomes
+    return dict(outcomes)
 
 
 def mutated(choose: random.Random, corpus: list[bytes]) -> bytes:

@@ -25,8 +25,9 @@ from palette4d.cli.main import main
 from palette4d.grade.document import Document
 from palette4d.studio.session import Session, recovered
 
+LEFT_OUT = ("palette4d.studio", "palette4d.__main__", "palette4d.common.windows")
 for found in pkgutil.walk_packages(palette4d.__path__, "palette4d."):
-    if not found.name.startswith(("palette4d.studio", "palette4d.__main__")):
+    if not found.name.startswith(LEFT_OUT):
         importlib.import_module(found.name)
 for name in ("OpenImageIO", "PyOpenColorIO", "fileseq", "opentimelineio", "matplotlib.figure"):
     importlib.import_module(name)

@@ -41,7 +41,7 @@ def test_any_bytes(kind: str, inputs: int) -> None:
         folder = Path(name)
         while time.monotonic() < ends if seconds else number < inputs:
             try:
-                outcomes += child.call(reader_targets.many, kind, seed, number, batch, folder)
+                outcomes.update(child.call(reader_targets.many, kind, seed, number, batch, folder))
                 number += batch
             except ChildError as error:
                 at = int((folder / "number").read_text())
