@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 from child_calls import crash, fault, grow, hang, refuse, speak_to_the_tracker, take_over, well
+from confining import confines
 from farm_processes import running, wait_for
 from wine import WINE
 
-from palette4d.common import sandbox
 from palette4d.common.child import Child, ChildError
 from palette4d.common.errors import Palette4dError, SidecarError
 
@@ -136,7 +136,7 @@ def test_an_answer_runs_no_code_here(tmp_path: Path) -> None:
     assert not folder.exists()
 
 
-@pytest.mark.skipif(bool(sandbox.missing()), reason=sandbox.missing() or "confines")
+@confines
 def test_a_confined_child_speaks_to_its_parent_alone() -> None:
     tests = Path(__file__).parents[1]
     with Child(20) as free, Child(20, reads=[tests]) as confined:

@@ -35,13 +35,6 @@ def failing(problem: BaseException) -> Callable[..., None]:
     return fail
 
 
-@pytest.fixture
-def old(tmp_path: Path) -> Path:
-    path = tmp_path / "grade.cube"
-    path.write_bytes(b"old")
-    return path
-
-
 def test_the_old_file_stays_until_the_new_one_is_complete(old: Path) -> None:
     with replacing(old, force=True) as temporary:
         assert temporary.parent == old.parent

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import hostile_reader
 import pytest
+from confining import confines, forks
 from edits import sequence
 from farm_processes import wait_for
 
@@ -19,9 +20,6 @@ from palette4d.common import sandbox
 from palette4d.common.errors import Palette4dError
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
-
-#: Nothing that can be installed gives a kernel without Landlock a sandbox.
-confines = pytest.mark.skipif(bool(sandbox.missing()), reason=sandbox.missing() or "confines")
 
 VERBS = {
     "analyze": "analyze clip/ -o out.p4d.json --quiet",
@@ -188,7 +186,7 @@ def script(tmp_path: Path, *lines: str) -> subprocess.Popen[str]:
     )
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows has neither fork nor the sandbox")
+@forks
 def test_the_writer_refuses_what_the_command_was_not_begun_for(tmp_path: Path) -> None:
     (tmp_path / "link.mov").symlink_to(tmp_path / "secret")
     (tmp_path / "secret").write_text("secret")
@@ -218,7 +216,7 @@ def test_the_writer_refuses_what_the_command_was_not_begun_for(tmp_path: Path) -
     assert (tmp_path / "secret").read_text() == "secret"
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows has neither fork nor the sandbox")
+@forks
 def test_a_command_that_is_killed_leaves_nothing(tmp_path: Path) -> None:
     """Its writer ends with it, gives the lock back, and removes the temporary folder."""
     with script(

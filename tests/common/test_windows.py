@@ -31,13 +31,6 @@ with locked(Path(sys.argv[1])):
 """
 
 
-@pytest.fixture
-def old(tmp_path: Path) -> Path:
-    path = tmp_path / "Grüße 色.cube"
-    path.write_bytes(b"old")
-    return path
-
-
 def replace(path: Path) -> None:
     with replacing(path, force=True) as temporary:
         temporary.write_bytes(b"new")

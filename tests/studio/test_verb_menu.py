@@ -68,13 +68,19 @@ def answer(dialog: VerbDialog, text: str) -> None:
     next(button for button in box.buttons() if button.text() == text).click()
 
 
-def test_a_window_that_is_closed_asks_before_it_ends_a_job(
-    opened: Window, tmp_path: Path, qtbot: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def analysis(opened: Window, tmp_path: Path) -> VerbDialog:
+    """The dialog of an analysis into a new file."""
     dialog = opened.verbs.analyze_again()
     line = dialog.entry("-o")
     assert isinstance(line, QLineEdit)
     line.setText(str(tmp_path / "again.p4d.json"))
+    return dialog
+
+
+def test_a_window_that_is_closed_asks_before_it_ends_a_job(
+    opened: Window, tmp_path: Path, qtbot: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dialog = analysis(opened, tmp_path)
     dialog.start()
     job = dialog.job
     assert job is not None
@@ -98,10 +104,7 @@ def test_a_window_that_is_closed_asks_before_it_ends_a_job(
 def test_escape_asks_and_stops_what_runs_and_the_dialog_says_so(
     opened: Window, tmp_path: Path, qtbot: Any
 ) -> None:
-    dialog = opened.verbs.analyze_again()
-    line = dialog.entry("-o")
-    assert isinstance(line, QLineEdit)
-    line.setText(str(tmp_path / "again.p4d.json"))
+    dialog = analysis(opened, tmp_path)
     dialog.activateWindow()
     qtbot.waitUntil(dialog.isActiveWindow)
     dialog.start()

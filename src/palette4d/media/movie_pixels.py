@@ -36,7 +36,7 @@ def _newer(cls: type[Type], value: int) -> Type:
     return cast(Type, found)
 
 
-Type._missing_ = classmethod(_newer)  # type: ignore[assignment] # the hook of enum.Enum
+Type._missing_ = classmethod(_newer)  # type: ignore[assignment] # mypy: no method is assigned
 
 
 def turn(picture: av.VideoFrame) -> tuple[bool, bool, bool]:
