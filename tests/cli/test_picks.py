@@ -226,12 +226,6 @@ def test_without_its_clip_a_pick_stays_and_says_so(path: str, run: Run, analysed
     assert "follows" in run("pick", *words, "--clip", str(analysed / "clip"))[1]
 
 
-def test_a_hold_of_the_picked_colour_is_told(run: Run) -> None:
-    words = ("--frame", "2", "--colour", "0.36,0.6,0.2", "--no-follow")
-    assert "is off by" not in run("pick", *words, "--by", "0.2,0,0")[2]
-    assert re.search(r"p2 is off by 0\.2\d\d: p1", run("hold", *words)[2])
-
-
 def test_the_same_pick_again_is_named(path: str, run: Run) -> None:
     words = ("pick", "--frame", "2", "--pixel", "3,3", "--box", "3", "--by", "0.1,0,0")
     assert run(*words)[0] == 0

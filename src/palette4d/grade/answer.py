@@ -20,7 +20,7 @@ from palette4d.grade import pick_edits
 from palette4d.grade.clip_of_picks import ClipOfPicks, largest_part
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.grade import Grade
-from palette4d.grade.mattes import display_curve
+from palette4d.grade.pick_edits import When
 from palette4d.grade.picks import ALIKE, Area, Pick
 from palette4d.media.source_clip import nearest_frame
 
@@ -30,40 +30,30 @@ B = NDArray[np.bool_]
 
 #: The frame is reduced to about this width, in pixels: more take longer and show nothing more.
 WIDTH = 480
-#: A pixel that gets at least this share of the change is taken. One that was marked is not taken if
-#: it gets less than LEAST: pale parts of a thing change a little.
+#: Least share of the change of a pixel that counts as taken. A marked pixel with less than LEAST is
+#: reported: pale parts of a thing change a little.
 TAKEN, LEAST = 0.25, 0.05
 #: Least shares of the frame to report: of other things that are taken, of a part of the thing that
-#: is not, and of what a hold keeps. Smaller ones are seldom seen.
+#: is not, and of what a hold keeps. Smaller areas are seldom seen.
 OTHERS, PART, KEPT = 0.005, 0.01, 0.001
-#: An area may add this many times the part that it is for; one that adds more floods.
+#: A proposed box may add at most this many times the part that it is for; more is a flood.
 MULTIPLIES = 1.3
-#: A hold may cost the picked thing this share of its pixels. One that costs more is not proposed,
-#: and reported.
+#: Largest share of the picked thing that a proposed hold may cost, and that is not reported.
 COST = 0.1
-#: A pick that takes more than this share of what another one takes is reported.
+#: A pick that takes more than this share of the pixels of another pick is reported.
 SHARED = 0.2
-#: A taken colour farther than this from the line of the picked hue in pick space has another hue:
-#: faces beside red clothes have 0.08 to 0.12. Below GREY, a picked colour has no hue.
+#: A taken colour farther than this from the line of the picked hue, in pick space, has another hue:
+#: faces beside red clothes have 0.08 to 0.12. A picked colour with less chroma than GREY has none.
 HUE, GREY = 0.08, 0.1
 #: A pick may take more than one thing if more than MOST of its pixels are farther than FAR from the
-#: picked colour in pick space. If it takes more than LARGE of the frame, or covers three of its
-#: borders, as skies and walls do: if SOME are, or SCATTERED of them are not connected with it.
-FAR, MOST, SOME, SCATTERED, LARGE = 0.2, 0.6, 0.1, 0.2, 0.25
+#: picked colour in pick space; SOME are enough if it takes more than LARGE of the frame, or covers
+#: three of its borders, as skies and walls do.
+FAR, MOST, SOME, LARGE = 0.2, 0.6, 0.1, 0.25
 
 
 @dataclass(frozen=True)
 class Place:
-    """A place that a gesture may name.
-
-    Attributes
-    ----------
-    frame : int
-    pixel : (int, int)
-    box : int
-    rgb : 3 floats
-        Its colour, in the palette's code values.
-    """
+    """A frame, a pixel and a box that a gesture may name, with their colour (code values)."""
 
     frame: int
     pixel: tuple[int, int]
@@ -97,19 +87,23 @@ class Note:
     id: str = ""
     warns: bool = False
 
+    def proposing(self, gesture: Literal["hold", "area"], taken: B) -> Note:
+        """Return the note with a gesture, after which the pick takes some pixels."""
+        return replace(self, gesture=gesture, effect=f"then takes {percent(taken.mean())}")
+
     def lines(self) -> list[str]:
         """Return the note for people, and the gesture as arguments of `edit`."""
-        text, at = "warning: " * self.warns + self.words, self.place
-        if at is None:
+        text, place = "warning: " * self.warns + self.words, self.place
+        if place is None:
             return [text]
-        pixel = f"{at.pixel[0]},{at.pixel[1]}"
-        lines = [f"{text}: {hex_of(at.rgb)} at {pixel}"]
+        pixel = f"{place.pixel[0]},{place.pixel[1]}"
+        lines = [f"{text}: {hex_of(place.rgb)} at {pixel}"]
         if self.gesture:
-            what = "  to keep it: hold"
-            if self.gesture == "area":
-                what = f"  if it belongs to the thing: area {self.id}"
-            where = f"--frame {at.frame} --pixel {pixel} --box {at.box}"
-            lines.append(f"{what} {where} ({self.effect})")
+            what = f"if it belongs to the thing: area {self.id}"
+            if self.gesture == "hold":
+                what = "to keep it: hold"
+            where = f"--frame {place.frame} --pixel {pixel} --box {place.box}"
+            lines.append(f"  {what} {where} ({self.effect})")
         return lines
 
 
@@ -136,29 +130,26 @@ class Answer:
         return [first, *(line for note in self.notes for line in note.lines())]
 
 
-def answer_to(grade: Grade, pick: Pick, of_clip: ClipOfPicks) -> Answer | None:
+def answer_to(grade: Grade, pick: Pick, clip: ClipOfPicks) -> Answer | None:
     """Return the answer to a pick or hold; None where the clip is not there."""
-    if of_clip.open() is None:
+    if clip.open() is None:
         return None
-    view = _View.of(grade, of_clip, pick.frame)
-    picks, holds = (
-        [p for p in grade.picks if p.enabled and p.id != pick.id and p.kind == kind]
-        for kind in ("pick", "hold")
-    )
-    share = float(view.taken(pick).mean())
+    view = _View.of(grade, clip, pick.frame)
+    others = [other for other in grade.picks if other.enabled and other.id != pick.id]
+    picks = [other for other in others if other.kind == "pick"]
+    notes: list[Note] = []
     if pick.kind == "hold":
         costs = [_cost(view, other, pick) for other in picks]
         notes = [note for cost in costs for note in cost or ()]
         if picks and all(cost is None for cost in costs):
             notes = [Note("no pick takes less by it: hold a place that one takes", warns=True)]
     else:
-        notes = [
-            *_unmarked(view, pick, holds),
-            *(note for hold in holds for note in _cost(view, pick, hold) or ()),
-            *_shared(view, pick, picks),
-            *_also(view, pick),
-        ]
-    return Answer(view.frame, share, tuple(notes))
+        holds = [other for other in others if other.kind == "hold"]
+        notes += _unmarked(view, pick, holds)
+        notes += (note for hold in holds for note in _cost(view, pick, hold) or ())
+        notes += _shared(view, pick, picks)
+        notes += _also(view, pick)
+    return Answer(view.frame, float(view.taken(pick).mean()), tuple(notes))
 
 
 @dataclass(frozen=True)
@@ -166,26 +157,26 @@ class _View:
     """A grade at a frame that is reduced: every n-th pixel of every n-th row, n = `every`."""
 
     grade: Grade
-    of_clip: ClipOfPicks
+    clip: ClipOfPicks
     frame: int
     every: int
     rgb: F32
     real: B
 
     @classmethod
-    def of(cls, grade: Grade, of_clip: ClipOfPicks, frame: float) -> _View:
-        clip = of_clip.open()
-        assert clip is not None
-        nearest = nearest_frame(clip, frame)
-        pixels = of_clip.read(nearest)
+    def of(cls, grade: Grade, clip: ClipOfPicks, frame: float) -> _View:
+        opened = clip.open()
+        assert opened is not None
+        nearest = nearest_frame(opened, frame)
+        pixels = clip.read(nearest)
         every = max(1, round(pixels.shape[1] / WIDTH))
-        rgb = np.ascontiguousarray(pixels[every // 2 :: every, every // 2 :: every])
+        rgb = pixels[every // 2 :: every, every // 2 :: every]
         real = np.asarray(np.isfinite(rgb).all(axis=2))
         shown = np.where(real[..., None], rgb, 0).astype(np.float32)
-        return cls(grade, of_clip, nearest, every, shown, real)
+        return cls(grade, clip, nearest, every, shown, real)
 
     def change(self, pick: Pick) -> F32:
-        """Return how much of a pick's change each pixel gets, in a trial as this grade has it."""
+        """Return the share of a pick's change that each pixel gets, with this view's grade."""
         # Any palette will do: none of its colours moves.
         corner, faces = np.zeros((1, 3)), np.zeros((0, 3), np.int32)
         matte = self.grade.core.pick_matte_at(pick.id, self.frame)
@@ -193,47 +184,51 @@ class _View:
         drawn = drawing.apply(self.rgb, precision="single")
         return np.where(self.real, (drawn - self.rgb)[..., 0], 0).astype(np.float32)
 
-    def taken(self, pick: Pick) -> B:
-        """Return the pixels that get at least a quarter of a pick's change."""
-        return np.asarray(self.change(pick) > TAKEN)
+    def taken(self, pick: Pick, grade: Grade | None = None) -> B:
+        """Return the pixels that a pick takes, with this view's grade or another one."""
+        view = self if grade is None else replace(self, grade=grade)
+        return np.asarray(view.change(pick) > TAKEN)
 
     def away(self, pick: Pick) -> tuple[F64, F64]:
         """Return each pixel's distance from the picked colour in pick space, and from its hue."""
-        display = display_curve(self.grade.encoding)
+        display = self.grade.display()
         points = _core.pick_points(self.rgb.reshape(-1, 3), display).reshape(self.rgb.shape)
-        own = _core.pick_points([pick.rgb], display)[0]
-        off = points - own
-        length = float(np.hypot(own[0], own[1]))
-        if length < GREY:
+        picked = _core.pick_points([pick.rgb], display)[0]
+        off = points - picked
+        chroma = float(np.hypot(picked[0], picked[1]))
+        if chroma < GREY:
             hue = np.hypot(off[..., 0], off[..., 1])
         else:
-            hue = np.abs(off[..., 0] * own[1] - off[..., 1] * own[0]) / length
+            hue = np.abs(off[..., 0] * picked[1] - off[..., 1] * picked[0]) / chroma
         return np.linalg.norm(off, axis=2), hue
 
     def mark(self, area: Area) -> B:
         """Return the pixels of a box or stroke."""
         marked = np.zeros(self.real.shape, bool)
+        half = max(area.radius / self.every, 0.5)
         for x, y in area.points:
-            half = max(area.radius / self.every, 0.5)
-            row, column = y / self.every, x / self.every
-            marked[
-                max(0, int(row - half)) : int(row + half) + 1,
-                max(0, int(column - half)) : int(column + half) + 1,
-            ] = True
+            rows, columns = (
+                slice(max(0, int(middle / self.every - half)), int(middle / self.every + half) + 1)
+                for middle in (y, x)
+            )
+            marked[rows, columns] = True
         return marked
 
     def seeds(self, pick: Pick) -> B:
         """Return the pixels that the user marked in this frame."""
-        marked = np.zeros(self.real.shape, bool)
-        for area in _marks(pick):
-            if round(area.frame) == self.frame:
-                marked |= self.mark(area)
-        return marked
+        marks = [self.mark(area) for area in _marks(pick) if round(area.frame) == self.frame]
+        return np.asarray(np.any([np.zeros(self.real.shape, bool), *marks], axis=0))
 
-    def own(self, pick: Pick, taken: B) -> B:
+    def thing(self, pick: Pick, taken: B) -> B:
         """Return what is connected with what the user marked here; all, if nothing was."""
+        from scipy import ndimage
+
         seeds = self.seeds(pick)
-        return _connected(taken, seeds) if seeds.any() else taken
+        if not seeds.any():
+            return taken
+        labels, _ = ndimage.label(ndimage.binary_dilation(taken))  # across gaps of a pixel or two
+        kept = np.unique(labels[seeds])
+        return np.asarray(np.isin(labels, kept[kept > 0]) & taken)
 
     def place(self, mask: B) -> Place:
         """Return the middle of a mask's largest part, and a box that lies in it."""
@@ -242,157 +237,140 @@ class _View:
         rgb = as_colour(np.median(self.rgb[largest], axis=0).tolist())
         return Place(self.frame, pixel, box * self.every, rgb)
 
-    def beside(self, pick: Pick, own: B, taken: B) -> B:
+    def beside(self, pick: Pick, thing: B, taken: B) -> B:
         """Return the largest part of the pick's hue that is connected with it and not taken."""
         from scipy import ndimage
 
         whole_hue = self.grade.put("pick", pick.id, replace(pick, matte=None))
-        rest = replace(self, grade=whole_hue).taken(pick) & ~taken
-        labels, count = ndimage.label(_opened(rest))
+        labels, count = ndimage.label(_opened(self.taken(pick, whole_hue) & ~taken))
         sizes = np.bincount(labels.ravel(), minlength=1)
         touching = np.zeros(count + 1, bool)
-        touching[labels[_widened(own)]] = True
+        touching[labels[_widened(thing)]] = True
         touching[0] = False
         if not touching.any():
-            return np.zeros_like(own)
+            return np.zeros_like(thing)
         return np.asarray(labels == np.where(touching, sizes, 0).argmax())
 
-    def with_hold(self, note: Note, pick: Pick, others: B, thing: B) -> Note:
-        """Return a note with a hold at its place, if that helps and spares the picked thing."""
-        assert note.place is not None
-        pixel, box = note.place.pixel, note.place.box
+    def after(self, pick: Pick, gesture: Literal["hold", "area"], place: Place) -> B | None:
+        """Return what a pick takes after a gesture at a place; None if the gesture is refused."""
         try:
-            trial, _ = pick_edits.hold(
-                self.grade, self.of_clip, self.frame, pixel=pixel, box=box, follow=False
-            )
+            if gesture == "hold":
+                where = When(pixel=place.pixel, box=place.box, follow=False)
+                trial, _ = pick_edits.hold(self.grade, self.clip, self.frame, **where)
+            else:
+                area = Area(self.frame, (place.pixel,), place.box / 2)
+                trial = pick_edits.add_area(self.grade, self.clip, pick.id, area)
         except Palette4dError:
-            return note
-        taken = replace(self, grade=trial).taken(trial.pick(pick.id))
-        left = taken & others
-        if left.sum() > 0.5 * others.sum() or (taken & thing).sum() < (1 - COST) * thing.sum():
-            return note
-        return replace(note, gesture="hold", effect=f"leaves {percent(left.mean())}")
+            return None
+        return self.taken(trial.pick(pick.id), trial)
 
-    def with_area(self, note: Note, pick: Pick, wanted: B) -> Note:
-        """Return a note with an area of a pick at its place, if that adds what is wanted alone."""
-        assert note.place is not None
-        area = Area(self.frame, (note.place.pixel,), note.place.box / 2)
-        try:
-            trial = pick_edits.add_area(self.grade, self.of_clip, pick.id, area)
-        except Palette4dError:
+    def with_area(self, note: Note, place: Place, pick: Pick, part: B) -> Note:
+        """Return a note with an area of a pick at its place, if that adds a part and no more."""
+        most = self.taken(pick).sum() + MULTIPLIES * part.sum()
+        taken = self.after(pick, "area", place)
+        if taken is None or taken[part].mean() < 0.5 or taken.sum() > most:
             return note
-        taken = replace(self, grade=trial).taken(trial.pick(pick.id))
-        more = taken.sum() - self.taken(pick).sum()
-        if (taken & wanted).sum() < 0.5 * wanted.sum() or more > MULTIPLIES * wanted.sum():
-            return note
-        return replace(note, gesture="area", effect=f"then takes {percent(taken.mean())}")
+        return note.proposing("area", taken)
 
 
 def _unmarked(view: _View, pick: Pick, holds: Sequence[Pick]) -> Iterator[Note]:
-    """Tell of what the user marked as the pick's, and it does not take."""
+    """Report areas that the user marked as the pick's and that it does not take."""
     for area in _marks(pick):
-        here = _View.of(view.grade, view.of_clip, area.frame)
-        marked = here.mark(area) & here.real
-        left = marked & (here.change(pick) < LEAST)
+        there = _View.of(view.grade, view.clip, area.frame)
+        marked = there.mark(area) & there.real
+        left = marked & (there.change(pick) < LEAST)
         if left.sum() <= 0.5 * marked.sum():
             continue
-        by = [hold.id for hold in holds if (left & here.taken(hold)).sum() > 0.5 * left.sum()]
+        keepers = [hold.id for hold in holds if there.taken(hold)[left].mean() > 0.5]
         why = "it looks like what is around it; pick it too, as a colour of its own"
-        if by:
-            why = f"{' and '.join(by)} keeps it; remove that hold, or hold another place"
-        yield Note(f"does not take what you marked ({why})", here.place(left), warns=True)
+        if keepers:
+            why = f"{' and '.join(keepers)} keeps it; remove that hold, or hold another place"
+        yield Note(f"does not take what you marked ({why})", there.place(left), warns=True)
 
 
 def _cost(view: _View, pick: Pick, hold: Pick) -> list[Note] | None:
-    """Tell of what a hold costs a pick's thing; None if the pick takes no less by it."""
+    """Report what a hold costs a pick's thing; None if the pick takes no less by it."""
     if round(pick.frame) != view.frame:
-        view = _View.of(view.grade, view.of_clip, pick.frame)
-    before = pick_edits.unpick(view.grade, view.of_clip, hold.id)
-    was = replace(view, grade=before).taken(before.pick(pick.id))
-    lost = was & ~view.taken(pick)
+        view = _View.of(view.grade, view.clip, pick.frame)
+    without = pick_edits.unpick(view.grade, view.clip, hold.id)
+    before = view.taken(without.pick(pick.id), without)
+    lost = before & ~view.taken(pick)
     if lost.mean() < KEPT:
         return None
-    # What is connected with the hold is what it is for.
-    held, own, seeds = view.own(hold, view.taken(hold)), view.own(pick, was), view.seeds(pick)
-    if (held & seeds).sum() > 0.5 * seeds.sum():
-        thing, words = own, f"{hold.id} lies on what {pick.id} takes, and costs it {{}}"
-    else:
-        thing, words = (
-            own & ~_widened(held),
-            f"{hold.id} also costs {pick.id} {{}} of its own thing",
-        )
+    held = view.thing(hold, view.taken(hold))  # what is connected with the hold is what it is for
+    thing, seeds = view.thing(pick, before), view.seeds(pick)
+    words = f"{hold.id} lies on what {pick.id} takes, and costs it {{}}"
+    if (held & seeds).sum() <= 0.5 * seeds.sum():
+        words = f"{hold.id} also costs {pick.id} {{}} of its own thing"
+        thing = thing & ~_widened(held)
         lost = _opened(lost & thing)
         if lost.sum() <= COST * thing.sum():
             return []
-    place, share = view.place(lost), percent(float(lost.sum() / max(thing.sum(), 1)))
-    note = Note(f"{words.format(share)}, most of it", place, id=pick.id, warns=True)
-    tried = view.with_area(note, pick, lost)
+    words = words.format(percent(float(lost.sum() / max(thing.sum(), 1))))
+    place = view.place(lost)
+    note = Note(f"{words}, most of it", place, id=pick.id, warns=True)
+    tried = view.with_area(note, place, pick, lost)
     if not tried.gesture:
-        words = f"{words.format(share)} (remove it, or hold another place), most of it"
-        tried = replace(note, words=words)
+        tried = replace(note, words=f"{words} (remove it, or hold another place), most of it")
     return [tried]
 
 
 def _shared(view: _View, pick: Pick, picks: Sequence[Pick]) -> Iterator[Note]:
-    """Tell of earlier picks that take the same pixels, and change them otherwise."""
+    """Report earlier picks that take the same pixels, and change them otherwise."""
     taken, ids = view.taken(pick), [each.id for each in view.grade.picks]
     for other in picks:
         unlike = np.linalg.norm(pick.change_at(view.frame) - other.change_at(view.frame))
         if ids.index(other.id) > ids.index(pick.id) or unlike < ALIKE:
             continue
-        both = taken & view.taken(other)
-        if both.sum() > SHARED * taken.sum():
-            share = percent(float(both.sum() / taken.sum()))
-            words = f"{other.id} takes {share} of this too; there the changes mix"
+        share = float((taken & view.taken(other)).sum() / max(taken.sum(), 1))
+        if share > SHARED:
             yield Note(
-                f"{words}. If this one replaces it, disable or remove {other.id}", warns=True
+                f"{other.id} takes {percent(share)} of this too; there the changes mix. If this "
+                f"one replaces it, disable or remove {other.id}",
+                warns=True,
             )
 
 
 def _also(view: _View, pick: Pick) -> Iterator[Note]:
-    """Tell of what the pick takes beside the thing, of what it may lack, and of floods."""
+    """Report what the pick takes beside the thing, a part that it may lack, and floods."""
     taken = view.taken(pick)
-    own = view.own(pick, taken)
+    thing = view.thing(pick, taken)
     away, hue = view.away(pick)
-    odd, elsewhere = _opened(taken & (hue > HUE)), taken & ~own
+    odd = _opened(taken & (hue > HUE))
     for words, others in (
         ("also takes another hue", odd),
-        ("also takes its colour elsewhere", elsewhere & ~odd),
+        ("also takes its colour elsewhere", taken & ~thing & ~odd),
     ):
-        if others.mean() > OTHERS:
-            share = percent(float(others.mean()))
-            note = Note(f"{words}, {share}, most of it", view.place(others), id=pick.id)
-            yield view.with_hold(note, pick, others, own & ~others)
-    part = view.beside(pick, own, taken)
+        share, spared = float(others.mean()), thing & ~others
+        if share > OTHERS:
+            place = view.place(others)
+            note = Note(f"{words}, {percent(share)}, most of it", place, id=pick.id)
+            held = view.after(pick, "hold", place)
+            if held is not None and held[others].mean() <= 0.5:
+                cost = (~held & spared).sum()
+                note = note.proposing("hold", held) if cost <= COST * spared.sum() else note
+            yield note
+    part = view.beside(pick, thing, taken)
     least = max(PART, 0.1 * taken.mean())
-    if least < part.mean() < own.mean() and not pick.whole_hue:  # a larger part is another thing
-        words = f"does not take {percent(float(part.mean()))} beside it"
-        note = view.with_area(Note(words, view.place(part), id=pick.id), pick, part)
+    if least < part.mean() < thing.mean() and not pick.whole_hue:  # a larger one is another thing
+        words, place = f"does not take {percent(float(part.mean()))} beside it", view.place(part)
+        note = view.with_area(Note(words, place, id=pick.id), place, pick, part)
         if note.gesture:
             yield note
-    large = taken.mean() > LARGE or _borders(own) >= 3
-    far = (away[own] > FAR).mean() if own.any() else 0
-    if far > (SOME if large else MOST) or (large and elsewhere.sum() > SCATTERED * taken.sum()):
+    sides = (thing[0], thing[-1], thing[:, 0], thing[:, -1])
+    large = taken.mean() > LARGE or sum(bool(side.mean() >= 1 / 3) for side in sides) >= 3
+    if thing.any() and (away[thing] > FAR).mean() > (SOME if large else MOST):
         less = ", or a lower reach, takes less" if pick.reach >= 0 else " takes less"
-        words = (
-            f"this may be more than one thing: look at its matte. A hold on what must stay{less}"
+        yield Note(
+            f"this may be more than one thing: look at its matte. A hold on what must stay{less}",
+            warns=True,
         )
-        yield Note(words, warns=True)
 
 
 def _marks(pick: Pick) -> list[Area]:
     """Return the box and the areas of a pick or hold."""
-    own = [] if pick.pixel is None else [Area(pick.frame, (pick.pixel,), (pick.box or 1) / 2)]
-    return [*own, *pick.areas]
-
-
-def _connected(mask: B, seeds: B) -> B:
-    """Return the regions of a mask that are connected with seeds, across gaps of a pixel or two."""
-    from scipy import ndimage
-
-    labels, _ = ndimage.label(ndimage.binary_dilation(mask))
-    kept = np.unique(labels[seeds])
-    return np.asarray(np.isin(labels, kept[kept > 0]) & mask)
+    box = [] if pick.pixel is None else [Area(pick.frame, (pick.pixel,), (pick.box or 1) / 2)]
+    return [*box, *pick.areas]
 
 
 def _opened(mask: B) -> B:
@@ -406,9 +384,3 @@ def _widened(mask: B) -> B:
     from scipy import ndimage
 
     return np.asarray(ndimage.binary_dilation(mask, iterations=4))
-
-
-def _borders(mask: B) -> int:
-    """Return how many of the frame's borders a mask covers for a third or more."""
-    sides = (mask[0], mask[-1], mask[:, 0], mask[:, -1])
-    return sum(bool(side.mean() >= 1 / 3) for side in sides)

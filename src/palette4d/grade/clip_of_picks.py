@@ -51,17 +51,6 @@ OWN_CLIP = Message(
 class ClipOfPicks:
     """The clip of a sidecar, opened when it is needed.
 
-    Parameters
-    ----------
-    clip : mapping
-        The sidecar's member "clip".
-    conversion : ColourConversion or None
-        From the clip's code values to the palette's.
-    sidecar : Path or None
-        The sidecar, for the path of its clip.
-    given : path, optional
-        The user's clip instead.
-
     Attributes
     ----------
     unread : bool
@@ -89,9 +78,9 @@ class ClipOfPicks:
     def of(cls, grade: Grade, given: Given = None) -> ClipOfPicks:
         """Return the clip of a grade, or the user's."""
         own = grade.analysed.conversion
-        found = cls(grade.members["clip"], None if own is None else own.steps, grade.path, given)
-        found.display = grade.display()
-        return found
+        clip = cls(grade.members["clip"], None if own is None else own.steps, grade.path, given)
+        clip.display = grade.display()
+        return clip
 
     def open(self) -> Clip | None:
         """Return the clip, or None if none was given and the sidecar's clip is not there.
@@ -104,8 +93,7 @@ class ClipOfPicks:
         if self._clip is not None:
             return self._clip
         given = None if self._given is None else os.fspath(self._given)
-        clip = find_clip(self._sidecar, self._fields, given)
-        if clip is None:
+        if (clip := find_clip(self._sidecar, self._fields, given)) is None:
             return None
         width, height = self._fields["size"]
         frames = self._fields["frames"]
@@ -199,10 +187,9 @@ class ClipOfPicks:
         return learn(pick, holds, frames, self.read, display)
 
     def at_home(self, pick: Pick, display: Display | None) -> Pick | None:
-        """Return a pick of another clip with its colour in this one; None if it is not here.
+        """Return a pick of another clip at the largest region here that has nearly its colour.
 
-        It is here where a region of pixels, connected, has nearly the colour: the largest one
-        becomes the pick's place.
+        None if no connected region of `LEAST_REGION` has it.
         """
         from scipy import ndimage
 
@@ -217,8 +204,8 @@ class ClipOfPicks:
         alike = ndimage.binary_opening(near & real)
         if not alike.any():
             return None
-        largest, place, box = largest_part(alike)
-        if largest.mean() < LEAST_REGION:
+        region, place, box = largest_part(alike)
+        if region.mean() < LEAST_REGION:
             return None
         rgb = self.colour(frame, place, box)
         return replace(pick, frame=frame, rgb=rgb, pixel=place, box=box)
@@ -237,8 +224,7 @@ class ClipOfPicks:
             return ()
         lines = []
         rgb, counts = colours[0]
-        unlike = min((_unlike(rgb, counts, rgbw) for rgbw in stored), default=0.0)
-        if unlike > OTHER_CLIP:
+        if min((_unlike(rgb, counts, rgbw) for rgbw in stored), default=0.0) > OTHER_CLIP:
             lines.append(
                 f"the colours of frame {frame} of {clip.source} differ much from those that were "
                 f"analysed; if it is another clip, give the analysed one as {Arg('clip')}, or "
@@ -262,16 +248,16 @@ class ClipOfPicks:
         return tuple(map(Message, lines))
 
     @property
-    def there(self) -> bool:
-        """Whether the clip can be read."""
-        return self.open() is not None
+    def missing(self) -> bool:
+        """Whether the clip cannot be read."""
+        return self.open() is None
 
     def path(
         self, pick: Pick, given: Sequence[PathKey] = (), progress: Progress | None = None
     ) -> tuple[PathKey, ...]:
-        """Return the path of a pick from its own colour and the given keys of its path.
+        """Follow a pick from its own colour and the given keys of its path.
 
-        Those keys alone if the clip is not there, or if the range is a single frame.
+        Returns those keys alone if the clip is missing, or if the range is a single frame.
         """
         frames = self._fields["frames"]
         begin, _, _, end = pick.knots(frames["step"])
@@ -287,10 +273,7 @@ class ClipOfPicks:
 def _unlike(
     rgb: NDArray[np.float64], counts: NDArray[np.float64], rgbw: NDArray[np.float64]
 ) -> float:
-    """Return how much the colours of a frame differ from stored ones, 0..1.
-
-    Compared are how many pixels of each are near the stored colours.
-    """
+    """Return how the shares of pixels near stored colours differ from the stored shares, 0..1."""
     near = []
     for colours, shares in ((rgb, counts), (rgbw[:, :3], rgbw[:, 3])):
         square = ((colours[:, None] - rgbw[:, :3]) ** 2).sum(axis=2)
@@ -299,13 +282,7 @@ def _unlike(
 
 
 def corrected(pick: Pick, frame: float, rgb: Colour) -> Pick:
-    """Return a pick whose path goes through a colour at another frame, before it is followed.
-
-    Raises
-    ------
-    Palette4dError
-        The frame is the pick's own.
-    """
+    """Return a pick whose path goes through a colour at another frame, before it is followed."""
     if frame == pick.frame:
         raise Palette4dError(
             f"{pick.id} was picked at frame {frame:g} itself, expected another frame: change its "
@@ -317,10 +294,7 @@ def corrected(pick: Pick, frame: float, rgb: Colour) -> Pick:
 
 
 def main_colour(colours: NDArray[np.float64], display: Display | None) -> NDArray[np.bool_]:
-    """Return which of (n, 3) colours are the main one's: near the colour that most are near.
-
-    Near in pick space, where the shades of a thing are.
-    """
+    """Return which of (n, 3) colours are near, in pick space, the colour that most are near."""
     points = _core.pick_points(colours, display)
     some = points[:: -(-len(points) // 1024)]
     near = ((some[:, None] - some) ** 2).sum(axis=2) < ALIKE**2

@@ -119,7 +119,7 @@ class Match:
 
 
 def copied(
-    target: Grade, source: Grade, of_clip: ClipOfPicks, time: Time = "relative"
+    target: Grade, source: Grade, clip: ClipOfPicks, time: Time = "relative"
 ) -> tuple[Grade, Fit]:
     """Take over the grade of another palette (`Document.copy_from`); return also how it fits."""
     if source.path is not None and target.path is not None and same_file(source.path, target.path):
@@ -135,7 +135,7 @@ def copied(
     after = kept.with_state({**kept.of_kind("version", "note", "lock"), **state})
     into = between(source.encoding, target.encoding, _configs(target, source))
     picks = (_pick(match, pick, into) for pick in source.picks)
-    after, left_out = taken(after, of_clip, [pick for pick in picks if pick is not None])
+    after, left_out = taken(after, clip, [pick for pick in picks if pick is not None])
     label = f"copy the grade of {source.members['clip']['name']}"
     return after.labelled(label), replace(fit(after, source, time), left_out=tuple(left_out))
 

@@ -354,8 +354,8 @@ class Document:
         Between two given frames the path goes gradually from what follows the one to what follows
         the other.
         """
-        of_clip = self._clip(clip)
-        self._take(pick_edits.correct_path(self.grade, of_clip, id, frame, progress, **where))
+        own = self._clip(clip)
+        self._take(pick_edits.correct_path(self.grade, own, id, frame, progress, **where))
         return self.grade.pick(id)
 
     def add_area(self, id: str, area: Area, *, clip: OfClip | None = None) -> Pick:

@@ -42,10 +42,7 @@ class Unread(ClipOfPicks):
         super().__init__({}, None, None)
         self._colour, self._learned = tuple(colour), learned
 
-    @property
-    def there(self) -> bool:
-        """True: an edit that needs the clip is tried with it later."""
-        return True
+    missing = False  # an edit that needs the clip is tried with it later
 
     def colour(self, frame: float, pixel: tuple[float, float], box: int) -> Colour:
         """Return the colour that is known."""

@@ -8,15 +8,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, TypedDict, Unpack
 
-import numpy as np
-
 from palette4d.common.errors import Arg, Palette4dError
 from palette4d.common.text import hex_of
-from palette4d.grade import recolouring
 from palette4d.grade.clip_colours import ClipColours
 from palette4d.grade.clip_of_picks import ClipOfPicks, corrected
 from palette4d.grade.colour_moves import fades_text, range_text
-from palette4d.grade.edits import VISIBLE, Key, as_colour, new_id
+from palette4d.grade.edits import Key, as_colour, new_id
 from palette4d.grade.follow import Progress
 from palette4d.grade.grade import Grade
 from palette4d.grade.picks import MOST_PICKS, Area, Pick, Toward, check
@@ -77,13 +74,13 @@ class Asked(When, total=False):
 
 def pick(
     grade: Grade,
-    of_clip: ClipOfPicks,
+    clip: ClipOfPicks,
     frame: float,
     progress: Progress | None = None,
     **asked: Unpack[Asked],
 ) -> tuple[Grade, Pick]:
     """Change a thing's colour into another one (`Document.pick`)."""
-    picked = _picked(grade, of_clip, frame, asked)
+    picked = _picked(grade, clip, frame, asked)
     to, by = asked.get("to"), asked.get("by")
     if to is not None and by is None:
         new = grade.checked(to, asked.get("any_value", False))
@@ -98,55 +95,53 @@ def pick(
     names = ("toward", "whole_hue", "reach", "softness", "lightness")
     shape = {name: given[name] for name in names if name in given}
     made = replace(picked, kind="pick", to=new, **shape)
-    return _add(grade, of_clip, made, asked, progress)
+    return _add(grade, clip, made, asked, progress)
 
 
 def hold(
     grade: Grade,
-    of_clip: ClipOfPicks,
+    clip: ClipOfPicks,
     frame: float,
     progress: Progress | None = None,
     **asked: Unpack[When],
 ) -> tuple[Grade, Pick]:
     """Keep a thing's colour as it is (`Document.hold`)."""
-    return _add(grade, of_clip, _picked(grade, of_clip, frame, asked), asked, progress)
+    return _add(grade, clip, _picked(grade, clip, frame, asked), asked, progress)
 
 
 def correct_path(
     grade: Grade,
-    of_clip: ClipOfPicks,
+    clip: ClipOfPicks,
     id: str,
     frame: float,
     progress: Progress | None = None,
     **where: Unpack[Where],
 ) -> Grade:
     """Say where the colour of a pick or hold is at another frame (`Document.correct_path`)."""
-    picked = _picked(grade, of_clip, frame, where)
+    picked = _picked(grade, clip, frame, where)
     changed = corrected(grade.pick(id), picked.frame, picked.rgb)
-    changed = replace(changed, path=of_clip.path(changed, changed.path, progress))
-    return _learned(
-        grade, of_clip, changed, f"correct {id}: {hex_of(picked.rgb)} at frame {frame:g}"
-    )
+    changed = replace(changed, path=clip.path(changed, changed.path, progress))
+    return _learned(grade, clip, changed, f"correct {id}: {hex_of(picked.rgb)} at frame {frame:g}")
 
 
-def add_area(grade: Grade, of_clip: ClipOfPicks, id: str, area: Area) -> Grade:
+def add_area(grade: Grade, clip: ClipOfPicks, id: str, area: Area) -> Grade:
     """Say that a box or a stroke belongs to a pick or hold too (`Document.add_area`)."""
     old = grade.pick(id)
     grade.check_frame(area.frame)
-    if not of_clip.there:
+    if clip.missing:
         raise Palette4dError(
             f"the clip {grade.members['clip']['source']!r} is not there, so that nothing can be "
             f"learned from its pixels; give {Arg('clip')}"
         )
-    of_clip.check_places(area.frame, area.points)
+    clip.check_places(area.frame, area.points)
     changed = replace(old, areas=(*old.areas, area), whole_hue=False)
     what = "a box" if len(area.points) == 1 else "a stroke"
-    return _learned(grade, of_clip, changed, f"add {what} at frame {area.frame:g} to {id}")
+    return _learned(grade, clip, changed, f"add {what} at frame {area.frame:g} to {id}")
 
 
 def change_pick(
     grade: Grade,
-    of_clip: ClipOfPicks,
+    clip: ClipOfPicks,
     id: str,
     *,
     by: Iterable[float] | None = None,
@@ -160,7 +155,7 @@ def change_pick(
     if changes.get("pixel") is not None and "rgb" not in changes:
         frame, box = changes.get("frame", old.frame), changes.get("box") or 1
         grade.check_frame(frame)
-        changes |= {"rgb": of_clip.colour(frame, changes["pixel"], box), "box": box}
+        changes |= {"rgb": clip.colour(frame, changes["pixel"], box), "box": box}
     if by is not None:
         base = as_colour(changes.get("rgb", old.rgb))
         changes["to"] = [a + b for a, b in zip(base, as_colour(by, "offset"), strict=True)]
@@ -171,83 +166,63 @@ def change_pick(
     if old.kind == "hold" and bad:
         raise Palette4dError(f"{id} is a hold, which has no {' and no '.join(sorted(bad))}")
     new = _with_one_fade(replace(old, **changes))
-    _check(grade, new)
+    grade.check_frame(new.frame)
+    check(new, grade.frames)
     moved = {"frame", "rgb", "start", "until", "fade", "fade_out"} & changes.keys()
     if follow is False:
         new = replace(new, path=())
     elif follow or (moved and old.path):
         given = tuple(key for key in old.path if key.given and key.frame != old.frame)
-        new = replace(new, path=of_clip.path(new, given, progress))
+        new = replace(new, path=clip.path(new, given, progress))
     label = f"change {id}: {_changed(old, new)}"
     if old.enabled != new.enabled:
         label = f"{'enable' if new.enabled else 'disable'} {id}"
     learns = moved or {"pixel", "box", "areas", "whole_hue"} & changes.keys()
     if learns or follow is not None or (new.kind == "hold" and old.enabled != new.enabled):
-        return _learned(grade, of_clip, new, label)
+        return _learned(grade, clip, new, label)
     return grade.put("pick", id, new, label)
 
 
-def unpick(grade: Grade, of_clip: ClipOfPicks, *ids: str) -> Grade:
+def unpick(grade: Grade, clip: ClipOfPicks, *ids: str) -> Grade:
     """Remove picks and holds. Without a hold, the others' mattes are learned again."""
     holds = any(grade.pick(id_).kind == "hold" for id_ in ids)
     keys: list[Key] = [("pick", id_) for id_ in ids]
     grade = grade.having(dict.fromkeys(keys))
     if holds:
-        grade = _all_learned(grade, of_clip)
+        grade = _all_learned(grade, clip)
     return grade.labelled(f"remove {' '.join(ids)}")
 
 
-def taken(grade: Grade, of_clip: ClipOfPicks, picks: Iterable[Pick]) -> tuple[Grade, list[str]]:
+def taken(grade: Grade, clip: ClipOfPicks, picks: Iterable[Pick]) -> tuple[Grade, list[str]]:
     """Take over picks of another clip, learned here; return also those whose colour is not here.
 
     Without the clip they take all of their hue, as they cannot be learned.
     """
-    left_out = []
+    left_out, there = [], clip.open() is not None
     # Holds first: they are background for the picks.
     for pick in sorted(picks, key=lambda pick: pick.kind == "pick"):
-        there = of_clip.open() is not None
-        here = of_clip.at_home(pick, grade.display()) if there and not pick.whole_hue else pick
+        here = clip.at_home(pick, grade.display()) if there and not pick.whole_hue else pick
         if here is None:
             left_out.append(f"{pick.id} ({_asked(pick)})")
-            continue
-        if there:
-            here = replace(here, path=of_clip.path(here))
-        grade = _with_matte(grade, of_clip, here)
+        else:
+            moved = replace(here, path=clip.path(here)) if there else here
+            grade = _with_matte(grade, clip, moved)
     return grade, left_out
 
 
-def warnings(grade: Grade, of_clip: ClipOfPicks, id: str) -> tuple[str, ...]:
+def warnings(grade: Grade, clip: ClipOfPicks, id: str) -> tuple[str, ...]:
     """Return what speaks against the clip of a pick or hold, and its colour."""
     pick = grade.pick(id)
     known = ClipColours(grade.core.polytope, grade.members)
     stored = [known.colours_at(pick.frame), *known.colours] if known.colours else []
-    lines = of_clip.warnings(pick, stored) + _unmet(grade, pick)
+    lines = clip.warnings(pick, stored)
     outside = pick.to is not None and not all(-0.05 <= value <= 1.05 for value in pick.to)
     if outside and not grade.scene_linear:
         lines += (f"the new colour of {id} lies far outside 0..1; most files clip it",)
     return lines
 
 
-def _unmet(grade: Grade, pick: Pick) -> tuple[str, ...]:
-    """Return a line if a picked colour does not become what is asked, with the likely cause."""
-    step = grade.frames[2]
-    if not pick.enabled or pick.strength_at(pick.frame, step) < 1:
-        return ()
-    image = np.array(pick.rgb, np.float32)[None, None]
-    result = recolouring.recolour(grade, image, pick.frame, space="palette", clean_up=0)[0, 0]
-    missed = float(np.linalg.norm(result - pick.rgb - pick.change_at(pick.frame)))
-    others = [p for p in grade.picks if p.enabled and p.id != pick.id]
-    if missed <= VISIBLE or not others:
-        return ()
-    away = [float(np.linalg.norm(p.colour_at(pick.frame) - pick.rgb)) for p in others]
-    near = others[int(np.argmin(away))]
-    return (
-        f"{pick.id} is off by {missed:.3f}: {near.id} has nearly the same colour, {min(away):.3f} "
-        f"away, and asks for something else. Change or disable one of {pick.id} and {near.id}",
-    )
-
-
-def _picked(grade: Grade, of_clip: ClipOfPicks, frame: float, where: Where) -> Pick:
+def _picked(grade: Grade, clip: ClipOfPicks, frame: float, where: Where) -> Pick:
     """Return a hold of a colour at a frame."""
     grade.check_frame(frame)
     colour, pixel, box = where.get("colour"), where.get("pixel"), where.get("box", 1)
@@ -255,7 +230,7 @@ def _picked(grade: Grade, of_clip: ClipOfPicks, frame: float, where: Where) -> P
         rgb = grade.checked(colour, where.get("any_value", False))
         return Pick("", "hold", frame, rgb)
     if colour is None and pixel is not None:
-        rgb = of_clip.colour(frame, pixel, box)
+        rgb = clip.colour(frame, pixel, box)
         return Pick("", "hold", frame, rgb, pixel=pixel, box=box)
     raise Palette4dError(
         f"found {'neither' if colour is None else 'both'} of a colour and a pixel, expected "
@@ -264,7 +239,7 @@ def _picked(grade: Grade, of_clip: ClipOfPicks, frame: float, where: Where) -> P
 
 
 def _add(
-    grade: Grade, of_clip: ClipOfPicks, made: Pick, asked: When, progress: Progress | None
+    grade: Grade, clip: ClipOfPicks, made: Pick, asked: When, progress: Progress | None
 ) -> tuple[Grade, Pick]:
     enabled = sum(other.enabled for other in grade.picks)
     if enabled >= MOST_PICKS:
@@ -272,52 +247,47 @@ def _add(
             f"there are {enabled} picks and holds, and at most {MOST_PICKS} can be "
             "enabled; remove or disable some (`unpick`, `disable`)"
         )
-    made = replace(
-        made,
-        areas=tuple(asked.get("areas", ())),
-        start=asked.get("start"),
-        until=asked.get("until"),
-        fade=asked.get("fade", 0.0),
-        fade_out=asked.get("fade_out"),
-    )
-    made = _with_one_fade(made)
-    _check(grade, made)
+    given: dict[str, Any] = {**asked, "areas": tuple(asked.get("areas", ()))}
+    when = ("areas", "start", "until", "fade", "fade_out")
+    made = _with_one_fade(replace(made, **{name: given[name] for name in when if name in given}))
+    grade.check_frame(made.frame)
+    check(made, grade.frames)
     for area in made.areas:
-        of_clip.check_places(area.frame, area.points)
+        clip.check_places(area.frame, area.points)
     if asked.get("follow", True):
-        made = replace(made, path=of_clip.path(made, progress=progress))
+        made = replace(made, path=clip.path(made, progress=progress))
     for other in grade.picks:
-        if _same(replace(other, path=()) if of_clip.unread else other, made):
+        if _same(replace(other, path=()) if clip.unread else other, made):
             off = "" if other.enabled else f", disabled: `enable {other.id}`"
             raise Palette4dError(f"{other.id} is this {made.kind} already{off}; nothing was added")
     made = replace(made, id=new_id("p", [other.id for other in grade.picks]))
-    grade = _learned(grade, of_clip, made, f"{made.kind} {made.id}: {_asked(made)}")
+    grade = _learned(grade, clip, made, f"{made.kind} {made.id}: {_asked(made)}")
     return grade, grade.pick(made.id)
 
 
-def _learned(grade: Grade, of_clip: ClipOfPicks, pick: Pick, label: str) -> Grade:
+def _learned(grade: Grade, clip: ClipOfPicks, pick: Pick, label: str) -> Grade:
     """Set a pick or hold with a new matte; a hold changes the others' mattes."""
-    grade = _with_matte(grade, of_clip, pick)
+    grade = _with_matte(grade, clip, pick)
     if pick.kind == "hold":
-        grade = _all_learned(grade, of_clip)
+        grade = _all_learned(grade, clip)
     return grade.labelled(label)
 
 
-def _all_learned(grade: Grade, of_clip: ClipOfPicks) -> Grade:
+def _all_learned(grade: Grade, clip: ClipOfPicks) -> Grade:
     """Learn the mattes of all picks again, where the clip is there: their holds changed."""
     for old in grade.picks:
         if old.kind == "pick":
-            grade = _with_matte(grade, of_clip, old)
+            grade = _with_matte(grade, clip, old)
     return grade
 
 
-def _with_matte(grade: Grade, of_clip: ClipOfPicks, pick: Pick) -> Grade:
+def _with_matte(grade: Grade, clip: ClipOfPicks, pick: Pick) -> Grade:
     """Set a pick with the matte of its colour; without the clip it keeps the one it has."""
     if pick.whole_hue:
         return grade.put("pick", pick.id, replace(pick, matte=None))
     others = grade.picks if pick.kind == "pick" else ()
     holds = [p for p in others if p.kind == "hold" and p.enabled and p.id != pick.id]
-    learned = of_clip.learn(pick, holds, grade.display())
+    learned = clip.learn(pick, holds, grade.display())
     if learned is None:
         return grade.put("pick", pick.id, pick)
     matte = learned.id if learned.found else None
@@ -325,16 +295,10 @@ def _with_matte(grade: Grade, of_clip: ClipOfPicks, pick: Pick) -> Grade:
     return known.put("pick", pick.id, replace(pick, matte=matte))
 
 
-def _check(grade: Grade, pick: Pick) -> None:
-    grade.check_frame(pick.frame)
-    check(pick, grade.frames)
-
-
 def _same(old: Pick, new: Pick) -> bool:
-    """Return whether two picks ask for the same, whatever paths were found or corrected."""
-    unlike = bool(old.path) != bool(new.path)
-    mine = replace(old, path=(), enabled=True, matte=None)
-    return not unlike and mine == replace(new, id=old.id, path=(), matte=None)
+    """Return whether two picks ask for the same, whatever their paths and mattes are."""
+    rest: dict[str, Any] = {"id": "", "enabled": True, "path": (), "matte": None}
+    return bool(old.path) == bool(new.path) and replace(old, **rest) == replace(new, **rest)
 
 
 def _changed(old: Pick, new: Pick) -> str:

@@ -64,15 +64,15 @@ def save(fields: Fields, path: Path, *, on_edits: OnEdits = "refuse") -> tuple[S
 
 def _copied(former: Grade, new: Grade) -> tuple[Grade, list[str]]:
     """Return the new grade with the look of the former one and of its versions, and notes."""
-    of_clip, notes = ClipOfPicks.of(new), []
+    clip, notes = ClipOfPicks.of(new), []
     for name in former.versions:
         if (version := former.version(name)).edited:
-            new, _ = copied(new, version, of_clip)
+            new, _ = copied(new, version, clip)
             new, _ = save_version(new, name)
             new = set_note(new, name, former.note(name))
             new = reset(new)
     if former.edited:
-        new, fit = copied(new, former, of_clip)
+        new, fit = copied(new, former, clip)
         notes.append(f"the palette changed, so that the grade was copied: {fit}")
     return new, notes
 
