@@ -215,7 +215,7 @@ class TestAgain:
         done = render(sidecar, clip, out, skip_existing=True, **NONE)
         assert (done.frames, done.kept) == ([1, 2, 3], [4])
         assert any("3 damaged" in note for note in done.notes)
-        assert (tmp_path / f"o.1.{extension}").read_bytes()[:50] == whole[:50]
+        assert (tmp_path / f"o.1.{extension}").stat().st_size == len(whole)  # EXR has its time
         assert render(sidecar, clip, out, skip_existing=True, **NONE).frames == []
         later = (tmp_path / f"o.2.{extension}").stat().st_mtime + 10
         os.utime(sidecar, (later, later))
