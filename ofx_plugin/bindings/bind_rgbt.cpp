@@ -8,7 +8,7 @@
 
 #include "arrays.hpp"
 #include "binders.hpp"
-#include "fit/progressive_hull_4d.hpp"
+#include "fit/progressive_hull.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;

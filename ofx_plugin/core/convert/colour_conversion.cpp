@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <type_traits>
 #include <utility>
 
 #include "model/sidecar_error.hpp"
@@ -65,9 +66,31 @@ double interpolated(const std::vector<double>& x, const std::vector<double>& y, 
     return y[i - 1] + (at - x[i - 1]) * ((y[i] - y[i - 1]) / (x[i] - x[i - 1]));
 }
 
-double along(const CurveStep& s, std::size_t c, double at, bool backward) {
+/// One channel of a step at `x`, from y to x where `backward`. `scale` and `turn` are Prepared.
+double along(const LogStep& s, double scale, double turn, std::size_t c, double x, bool backward) {
+    if (backward) {
+        if (x <= turn) return s.start[c] + (x - turn) / s.below[c];
+        const double exponent = std::min((x - s.log_offset[c]) / scale, kLargestExponent);
+        return (std::exp2(exponent) - s.linear_offset[c]) / s.linear_slope[c];
+    }
+    if (x <= s.start[c]) return turn + s.below[c] * (x - s.start[c]);
+    return scale * std::log2(s.linear_slope[c] * x + s.linear_offset[c]) + s.log_offset[c];
+}
+
+double along(const GammaStep& s, double scale, double turn, std::size_t c, double x,
+             bool backward) {
+    if (s.mirrored && x < 0) return -along(s, scale, turn, c, -x, backward);
+    if (backward) {
+        if (x <= scale * turn) return x / scale;
+        return (1 + s.offset[c]) * std::pow(x, 1 / s.gamma[c]) - s.offset[c];
+    }
+    if (x <= turn) return scale * x;
+    return std::pow((x + s.offset[c]) / (1 + s.offset[c]), s.gamma[c]);
+}
+
+double along(const CurveStep& s, double, double, std::size_t c, double x, bool backward) {
     const SampledCurve& curve = s.curves[s.curves.size() == 1 ? 0 : c];
-    return backward ? interpolated(curve.y, curve.x, at) : interpolated(curve.x, curve.y, at);
+    return backward ? interpolated(curve.y, curve.x, x) : interpolated(curve.x, curve.y, x);
 }
 
 class Checker {
@@ -144,49 +167,6 @@ private:
 
 }  // namespace
 
-double ColourConversion::log_forward(const LogStep& s, const Prepared& at, std::size_t c,
-                                     double x) {
-    if (x <= s.start[c]) return at.turn[c] + s.below[c] * (x - s.start[c]);
-    return at.scale[c] * std::log2(s.linear_slope[c] * x + s.linear_offset[c]) + s.log_offset[c];
-}
-
-double ColourConversion::log_backward(const LogStep& s, const Prepared& at, std::size_t c,
-                                      double y) {
-    if (y <= at.turn[c]) return s.start[c] + (y - at.turn[c]) / s.below[c];
-    const double exponent = std::min((y - s.log_offset[c]) / at.scale[c], kLargestExponent);
-    return (std::exp2(exponent) - s.linear_offset[c]) / s.linear_slope[c];
-}
-
-double ColourConversion::gamma_forward(const GammaStep& s, const Prepared& at, std::size_t c,
-                                       double x) {
-    if (s.mirrored && x < 0) return -gamma_forward(s, at, c, -x);
-    if (x <= at.turn[c]) return at.scale[c] * x;
-    return std::pow((x + s.offset[c]) / (1 + s.offset[c]), s.gamma[c]);
-}
-
-double ColourConversion::gamma_backward(const GammaStep& s, const Prepared& at, std::size_t c,
-                                        double y) {
-    if (s.mirrored && y < 0) return -gamma_backward(s, at, c, -y);
-    if (y <= at.scale[c] * at.turn[c]) return y / at.scale[c];
-    return (1 + s.offset[c]) * std::pow(y, 1 / s.gamma[c]) - s.offset[c];
-}
-
-Vec3 ColourConversion::curved(const ConversionStep& step, const Prepared& at, const Vec3& x,
-                              bool against) {
-    Vec3 y{};
-    if (const auto* log = std::get_if<LogStep>(&step)) {
-        const auto curve = log->inverse != against ? log_backward : log_forward;
-        for (std::size_t c = 0; c < 3; ++c) y[c] = curve(*log, at, c, x[c]);
-    } else if (const auto* gamma = std::get_if<GammaStep>(&step)) {
-        const auto curve = gamma->inverse != against ? gamma_backward : gamma_forward;
-        for (std::size_t c = 0; c < 3; ++c) y[c] = curve(*gamma, at, c, x[c]);
-    } else {
-        const CurveStep& curve = std::get<CurveStep>(step);
-        for (std::size_t c = 0; c < 3; ++c) y[c] = along(curve, c, x[c], curve.inverse != against);
-    }
-    return y;
-}
-
 ColourConversion::ColourConversion(std::vector<ConversionStep> steps) : steps_(std::move(steps)) {
     for (std::size_t i = 0; i < steps_.size(); ++i) {
         std::visit(Checker(i), steps_[i]);
@@ -214,22 +194,32 @@ ColourConversion::ColourConversion(std::vector<ConversionStep> steps) : steps_(s
     }
 }
 
+Vec3 ColourConversion::converted(std::size_t i, const Vec3& x, bool against) const {
+    const Prepared& at = prepared_[i];
+    const auto convert = [&](const auto& step) -> Vec3 {
+        if constexpr (std::is_same_v<decltype(step), const MatrixStep&>) {
+            return product(against ? at.inverse : step, x);
+        } else {
+            const bool backward = step.inverse != against;
+            Vec3 y{};
+            for (std::size_t c = 0; c < 3; ++c) {
+                y[c] = along(step, at.scale[c], at.turn[c], c, x[c], backward);
+            }
+            return y;
+        }
+    };
+    return std::visit(convert, steps_[i]);
+}
+
 Vec3 ColourConversion::to_palette(const Vec3& clip) const {
     Vec3 at = clip;
-    for (std::size_t i = 0; i < steps_.size(); ++i) {
-        const auto* matrix = std::get_if<MatrixStep>(&steps_[i]);
-        at = matrix ? product(*matrix, at) : curved(steps_[i], prepared_[i], at, false);
-    }
+    for (std::size_t i = 0; i < steps_.size(); ++i) at = converted(i, at, false);
     return at;
 }
 
 Vec3 ColourConversion::to_clip(const Vec3& palette) const {
     Vec3 at = palette;
-    for (std::size_t i = steps_.size(); i-- > 0;) {
-        at = std::holds_alternative<MatrixStep>(steps_[i])
-                 ? product(prepared_[i].inverse, at)
-                 : curved(steps_[i], prepared_[i], at, true);
-    }
+    for (std::size_t i = steps_.size(); i-- > 0;) at = converted(i, at, true);
     return at;
 }
 

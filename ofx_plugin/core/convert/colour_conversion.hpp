@@ -65,12 +65,8 @@ private:
         MatrixStep inverse{};  ///< of a matrix step
         Vec3 scale{}, turn{};  ///< log: factor to log2, y at start; gamma: its line
     };
-    static double log_forward(const LogStep& s, const Prepared& at, std::size_t c, double x);
-    static double log_backward(const LogStep& s, const Prepared& at, std::size_t c, double y);
-    static double gamma_forward(const GammaStep& s, const Prepared& at, std::size_t c, double x);
-    static double gamma_backward(const GammaStep& s, const Prepared& at, std::size_t c, double y);
-    /// One step of curves, for three channels, in its own direction or against it.
-    static Vec3 curved(const ConversionStep& step, const Prepared& at, const Vec3& x, bool against);
+    /// Step i, in its own direction or against it.
+    Vec3 converted(std::size_t i, const Vec3& x, bool against) const;
 
     std::vector<ConversionStep> steps_;
     std::vector<Prepared> prepared_;  ///< one per step

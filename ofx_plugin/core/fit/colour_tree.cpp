@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "model/vec3.hpp"
-#include "simd/kernel_choice.hpp"
+#include "simd/instruction_set.hpp"
 
 namespace palette4d {
 namespace {

@@ -260,28 +260,22 @@ Image smoothed(const View& view, const Image& image) {
     for (int i = -kRadius; i <= kRadius; ++i) {
         kernel[i + kRadius] = static_cast<float>(std::exp(-0.5 * i * i / (kSigma * kSigma)) / sum);
     }
-    Image rows(view.size()), found(view.size());
-    for (int y = 0; y < view.height; ++y) {
-        for (int x = 0; x < view.width; ++x) {
-            float value = 0;
-            for (int i = -kRadius; i <= kRadius; ++i) {
-                value +=
-                    kernel[i + kRadius] * image[view.at(std::clamp(x + i, 0, view.width - 1), y)];
+    const auto blurred = [&](const Image& from, bool along_rows) {
+        Image to(view.size());
+        for (int y = 0; y < view.height; ++y) {
+            for (int x = 0; x < view.width; ++x) {
+                float value = 0;
+                for (int i = -kRadius; i <= kRadius; ++i) {
+                    value += kernel[i + kRadius] *
+                             from[along_rows ? view.at(std::clamp(x + i, 0, view.width - 1), y)
+                                             : view.at(x, std::clamp(y + i, 0, view.height - 1))];
+                }
+                to[view.at(x, y)] = value;
             }
-            rows[view.at(x, y)] = value;
         }
-    }
-    for (int y = 0; y < view.height; ++y) {
-        for (int x = 0; x < view.width; ++x) {
-            float value = 0;
-            for (int i = -kRadius; i <= kRadius; ++i) {
-                value +=
-                    kernel[i + kRadius] * rows[view.at(x, std::clamp(y + i, 0, view.height - 1))];
-            }
-            found[view.at(x, y)] = value;
-        }
-    }
-    return found;
+        return to;
+    };
+    return blurred(blurred(image, true), false);
 }
 
 /// The pixels of a region that are connected with seeds, across gaps of one or two pixels.

@@ -1,9 +1,8 @@
-#include "fit/palette_hull.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "fit/reconstruction.hpp"
 #include "model/vec3.hpp"
 
 namespace palette4d {

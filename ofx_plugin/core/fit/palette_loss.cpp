@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fit/palette_hull.hpp"
 #include "fit/reconstruction.hpp"
 #include "model/vec3.hpp"
-#include "simd/kernel_choice.hpp"
+#include "simd/instruction_set.hpp"
 
 namespace palette4d {
 namespace {

@@ -1,5 +1,3 @@
-#include "fit/progressive_hull_4d.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -12,6 +10,7 @@
 #include <utility>
 
 #include "fit/linear_program.hpp"
+#include "fit/progressive_hull.hpp"
 #include "model/vec3.hpp"
 
 namespace palette4d {

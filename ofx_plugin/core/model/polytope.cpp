@@ -5,8 +5,6 @@
 #include <numeric>
 #include <utility>
 
-#include "model/polytope_validation.hpp"
-
 namespace palette4d {
 namespace {
 

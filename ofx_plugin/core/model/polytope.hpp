@@ -80,4 +80,9 @@ private:
     std::shared_ptr<const Parts> parts_ = std::make_shared<const Parts>();
 };
 
+/// What a polytope's constructor checks: invariants between its parts. Numbers, counts, ids and
+/// indices are checked where they are read. Both throw SidecarError.
+void validate_edges(const std::vector<Vertex>& vertices, const std::vector<Edge>& edges);
+void validate_sections(const Polytope& polytope);
+
 }  // namespace palette4d

@@ -1,10 +1,9 @@
-#include "model/polytope_validation.hpp"
-
 #include <algorithm>
 #include <cstdio>
 #include <set>
 #include <utility>
 
+#include "model/polytope.hpp"
 #include "model/sidecar_error.hpp"
 
 namespace palette4d {
@@ -32,6 +31,7 @@ public:
           place_((section_.transition ? "/transitions/" : "/blocks/") + text(index / 2)) {}
 
     const std::string& place() const { return place_; }
+    std::size_t track_count() const { return section_.tracks.size(); }
     std::string track_place(std::size_t track) const { return place_ + "/tracks/" + text(track); }
 
     void tracks() const {
@@ -199,28 +199,27 @@ private:
 
 /// Tracks must match on both sides of the boundary: every transition track starts (ends) on a track
 /// of the block, and every track of the block continues.
-void check_continuity(const SectionCheck& block, std::size_t block_tracks,
-                      const SectionCheck& transition, std::size_t transition_tracks, double frame) {
-    std::set<std::pair<int, int>> of_block, of_transition;
-    for (std::size_t i = 0; i < block_tracks; ++i) of_block.insert(block.passage(i, frame));
-    for (std::size_t i = 0; i < transition_tracks; ++i) {
-        of_transition.insert(transition.passage(i, frame));
-    }
-    for (std::size_t i = 0; i < transition_tracks; ++i) {
-        if (of_block.count(transition.passage(i, frame)) == 0) {
-            fail(transition.track_place(i),
-                 "a track that meets no track of " + block.place() + " at frame " + text(frame),
+void check_continuity(const SectionCheck& block, const SectionCheck& transition, double frame) {
+    const auto passages = [&](const SectionCheck& section) {
+        std::vector<std::pair<int, int>> all;
+        for (std::size_t i = 0; i < section.track_count(); ++i) {
+            all.push_back(section.passage(i, frame));
+        }
+        return all;
+    };
+    const auto meets = [&](const SectionCheck& section, const SectionCheck& other) {
+        const auto theirs = passages(other);
+        const std::set<std::pair<int, int>> there(theirs.begin(), theirs.end());
+        const auto own = passages(section);
+        for (std::size_t i = 0; i < own.size(); ++i) {
+            if (there.count(own[i]) != 0) continue;
+            fail(section.track_place(i),
+                 "a track that meets no track of " + other.place() + " at frame " + text(frame),
                  "the same vertex or edge on both sides of a boundary");
         }
-    }
-    for (std::size_t i = 0; i < block_tracks; ++i) {
-        if (of_transition.count(block.passage(i, frame)) == 0) {
-            fail(
-                block.track_place(i),
-                "a track that meets no track of " + transition.place() + " at frame " + text(frame),
-                "the same vertex or edge on both sides of a boundary");
-        }
-    }
+    };
+    meets(transition, block);
+    meets(block, transition);
 }
 
 void check_times(const std::vector<Section>& sections) {
@@ -265,11 +264,8 @@ void validate_sections(const Polytope& polytope) {
         checks.back().faces();
     }
     for (std::size_t i = 1; i < sections.size(); i += 2) {
-        const std::size_t tracks = sections[i].tracks.size();
-        check_continuity(checks[i - 1], sections[i - 1].tracks.size(), checks[i], tracks,
-                         sections[i].first);
-        check_continuity(checks[i + 1], sections[i + 1].tracks.size(), checks[i], tracks,
-                         sections[i].last);
+        check_continuity(checks[i - 1], checks[i], sections[i].first);
+        check_continuity(checks[i + 1], checks[i], sections[i].last);
     }
 }
 

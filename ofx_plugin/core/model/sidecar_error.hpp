@@ -20,6 +20,8 @@ private:
     std::string file_, pointer_, found_, expected_;
 };
 
+/// The length of the well-formed UTF-8 sequence at text[at], 0 where there is none.
+std::size_t utf8_length(const std::string& text, std::size_t at);
 /// Text for a message: valid UTF-8 on one line, at most `limit` bytes plus an ellipsis.
 std::string printable(const std::string& text, std::size_t limit);
 /// A short text in quotes, made printable.

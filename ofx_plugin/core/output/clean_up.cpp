@@ -12,7 +12,7 @@
 #include "model/alpha.hpp"
 #include "output/clean_up_kernels.hpp"
 #include "recolour/recolour_plan.hpp"
-#include "simd/kernel_choice.hpp"
+#include "simd/instruction_set.hpp"
 
 namespace palette4d {
 namespace {

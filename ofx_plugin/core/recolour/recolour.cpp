@@ -7,8 +7,6 @@
 #include <utility>
 
 #include "model/vec3.hpp"
-#include "recolour/double_worker.hpp"
-#include "recolour/float_worker.hpp"
 #include "recolour/recolour_plan.hpp"
 
 namespace palette4d {
@@ -77,13 +75,6 @@ Vec3 Recolourer::displaced(const Vec3& p, double strength) const {
         if (step != 0) result[c] += step;
     }
     return result;
-}
-
-std::unique_ptr<RowWorker> Recolourer::worker(const RecolourOptions& options, int channels) const {
-    if (options.precision == Precision::kDouble) {
-        return std::make_unique<DoubleWorker>(*this, options, channels);
-    }
-    return float_worker(*this, options, channels);
 }
 
 }  // namespace palette4d

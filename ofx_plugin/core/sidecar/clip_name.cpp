@@ -1,6 +1,9 @@
 #include "sidecar/clip_name.hpp"
 
+#include <algorithm>
 #include <cstdint>
+
+#include "model/sidecar_error.hpp"
 
 namespace palette4d {
 namespace {
@@ -11,29 +14,15 @@ std::size_t stem_length(const std::string& file_name) {
     return dot == std::string::npos || dot == 0 ? file_name.size() : dot;
 }
 
-/// The code point at `at` and its length in bytes; U+FFFD for a byte that is no UTF-8.
-struct CodePoint {
-    std::uint32_t value = 0xfffd;
-    std::size_t length = 1;
-};
-
-CodePoint code_point(const std::string& text, std::size_t at) {
-    const auto byte = [&](std::size_t i) {
-        return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;
-    };
-    const unsigned first = byte(at);
-    if (first < 0x80) return {first, 1};
-    const std::size_t more = first >= 0xf0 ? 3 : first >= 0xe0 ? 2 : first >= 0xc2 ? 1 : 0;
-    if (more == 0 || first > 0xf4) return {};
-    std::uint32_t value = first & (0x3fu >> more);
-    for (std::size_t i = 1; i <= more; ++i) {
-        if ((byte(at + i) & 0xc0u) != 0x80) return {};
-        value = value << 6 | (byte(at + i) & 0x3fu);
+/// The code point of `length` bytes at text[at]; U+FFFD where the length is 0.
+std::uint32_t code_point(const std::string& text, std::size_t at, std::size_t length) {
+    if (length == 0) return 0xfffd;
+    std::uint32_t value =
+        static_cast<unsigned char>(text[at]) & (length == 1 ? 0x7fu : 0x7fu >> length);
+    for (std::size_t i = 1; i < length; ++i) {
+        value = value << 6 | (static_cast<unsigned char>(text[at + i]) & 0x3fu);
     }
-    constexpr std::uint32_t kSmallest[] = {0, 0x80, 0x800, 0x10000};
-    if (value < kSmallest[more] || value > 0x10ffff || (value >= 0xd800 && value < 0xe000))
-        return {};
-    return {value, more + 1};
+    return value;
 }
 
 /// Controls, spaces, marks without a shape, private and special characters (Unicode: Cc, Cf, Co,
@@ -100,10 +89,10 @@ std::string file_safe(const std::string& name, std::size_t longest) {
     std::string result;
     bool replaced = false;
     for (std::size_t at = 0; at < name.size();) {
-        const CodePoint one = code_point(name, at);
-        const bool unsafe = is_unsafe(one.value);
-        const std::string next = unsafe ? "_" : name.substr(at, one.length);
-        at += one.length;
+        const std::size_t length = utf8_length(name, at);
+        const bool unsafe = is_unsafe(code_point(name, at, length));
+        const std::string next = unsafe ? "_" : name.substr(at, length);
+        at += std::max(length, std::size_t{1});
         if (unsafe && replaced) continue;
         if (result.size() + next.size() > longest) break;
         result += next;

@@ -93,17 +93,13 @@ private:
     bool usable_ = false;
 };
 
-/// Symbols 257 to 285: the length of a copy, and how many bits are added to it.
-constexpr int kLengths[29] = {3,  4,  5,  6,  7,  8,  9,  10, 11,  13,  15,  17,  19,  23, 27,
-                              31, 35, 43, 51, 59, 67, 83, 99, 115, 131, 163, 195, 227, 258};
-constexpr int kLengthBits[29] = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2,
-                                 2, 3, 3, 3, 3, 4, 4, 4, 4, 5, 5, 5, 5, 0};
-/// The same for the distance back to what is copied.
-constexpr int kDistances[30] = {1,    2,    3,    4,    5,    7,    9,    13,    17,    25,
-                                33,   49,   65,   97,   129,  193,  257,  385,   513,   769,
-                                1025, 1537, 2049, 3073, 4097, 6145, 8193, 12289, 16385, 24577};
-constexpr int kDistanceBits[30] = {0, 0, 0, 0, 1, 1, 2, 2,  3,  3,  4,  4,  5,  5,  6,
-                                   6, 7, 7, 8, 8, 9, 9, 10, 10, 11, 11, 12, 12, 13, 13};
+/// The length or distance of a copy, of a group of symbols whose size doubles: `symbol` counts from
+/// 0, and each size has 2 `half` symbols. Further bits are added to it.
+std::size_t copied(Bits& bits, int symbol, int half, std::size_t least) {
+    const int more = symbol < 2 * half ? 0 : symbol / half - 1;
+    const int first = symbol < 2 * half ? symbol : (half + symbol % half) << more;
+    return least + static_cast<std::size_t>(first) + bits.take(more);
+}
 
 bool stored_block(Bits& bits, std::vector<std::uint8_t>& out, std::size_t size) {
     bits.to_byte();
@@ -124,17 +120,12 @@ bool coded_block(Bits& bits, const Code& literals, const Code& distances,
             out.push_back(static_cast<std::uint8_t>(symbol));
             continue;
         }
-        const int length =
-            kLengths[symbol - 257] + static_cast<int>(bits.take(kLengthBits[symbol - 257]));
+        const std::size_t length = symbol == 285 ? 258 : copied(bits, symbol - 257, 4, 3);
         const int back = distances.next(bits);
         if (back < 0 || back > 29) return false;
-        const auto distance =
-            static_cast<std::size_t>(kDistances[back]) + bits.take(kDistanceBits[back]);
-        if (bits.failed() || distance > out.size() ||
-            out.size() + static_cast<std::size_t>(length) > size) {
-            return false;
-        }
-        for (int i = 0; i < length; ++i) out.push_back(out[out.size() - distance]);
+        const std::size_t distance = copied(bits, back, 2, 1);
+        if (bits.failed() || distance > out.size() || out.size() + length > size) return false;
+        for (std::size_t i = 0; i < length; ++i) out.push_back(out[out.size() - distance]);
     }
 }
 

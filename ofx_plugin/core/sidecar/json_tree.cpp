@@ -50,14 +50,12 @@ public:
     bool parse_error(std::size_t position, const std::string&, const Json::exception& problem) {
         std::string detail = problem.what();
         // "[json.exception.parse_error.101] parse error at line 1, column 2: the detail"
-        if (const auto bracket = detail.find("] "); bracket != std::string::npos) {
-            detail.erase(0, bracket + 2);
-        }
-        if (detail.rfind("parse error", 0) == 0) {
-            if (const auto colon = detail.find(": "); colon != std::string::npos) {
-                detail.erase(0, colon + 2);
-            }
-        }
+        const auto erase_until = [&](const char* end) {
+            const auto at = detail.find(end);
+            if (at != std::string::npos) detail.erase(0, at + 2);
+        };
+        erase_until("] ");
+        if (detail.rfind("parse error", 0) == 0) erase_until(": ");
         if (problem.id == 406) fail("a number too large for a double", "a finite number");
         fail("no JSON at " + line_and_column(position) + " (" + printable(detail, 160) + ")",
              "JSON text (RFC 8259)");
@@ -139,16 +137,9 @@ private:
     }
 
     std::string line_and_column(std::size_t position) const {
-        std::size_t line = 1;
-        std::size_t column = 0;
-        for (std::size_t i = 0; i < position && i < text_.size(); ++i) {
-            if (text_[i] == '\n') {
-                ++line;
-                column = 0;
-            } else {
-                ++column;
-            }
-        }
+        const std::string before = text_.substr(0, position);
+        const auto line = 1 + std::count(before.begin(), before.end(), '\n');
+        const std::size_t column = before.size() - (before.rfind('\n') + 1);  // npos + 1 is 0
         return "line " + std::to_string(line) + ", column " + std::to_string(column);
     }
 
@@ -202,15 +193,7 @@ std::string digits_of(const Json& long_integer) {
 
 std::string pointer_token(const std::string& name) {
     std::string escaped = "/";
-    for (const char c : name) {
-        if (c == '~') {
-            escaped += "~0";
-        } else if (c == '/') {
-            escaped += "~1";
-        } else {
-            escaped += c;
-        }
-    }
+    for (const char c : name) escaped += c == '~' ? "~0" : c == '/' ? "~1" : std::string(1, c);
     return escaped;
 }
 

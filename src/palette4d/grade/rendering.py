@@ -124,13 +124,8 @@ def mismatches(document: Document, clip: Clip, whole: bool) -> list[str]:
 class Painter:
     """Draws a clip's frames, and something in the place of a bad frame.
 
-    Attributes
-    ----------
-    document, clip : the palette with its edits, and the clip.
-    drawn : what to draw.
-    compare, space, threads : as for `render`.
-    missing : what a bad frame shows; "leave out": nothing.
-    filled : the bad frames that show something, so far.
+    `missing` says what a bad frame shows; "leave out": nothing. `filled` are the bad frames that
+    show something, so far.
     """
 
     document: Document
@@ -246,10 +241,10 @@ def render(
 ) -> Rendered:
     """Recolour every frame of a clip and write it; memory holds three frames, of 6K and more one.
 
+    After Ctrl-C or an error, written frames are complete, and there is no movie.
+
     Parameters
     ----------
-    document : path or Document
-        The palette and its edits.
     clip : str, path or Clip
         A name for `open_clip`, or an opened clip; ``frames`` and ``skip_bad_frames`` are for names.
     output : str or path
@@ -291,18 +286,7 @@ def render(
         Called as ``tell(kind, text)`` before the first frame is rendered: "warning" where clip and
         sidecar differ, else "note".
     **picture
-        What to draw: ``strength``, ``show``, ``keep_lightness`` and so on, as for
-        `Document.recolour`.
-
-    Returns
-    -------
-    Rendered
-        After Ctrl-C or an error, written frames are complete, and there is no movie.
-
-    Raises
-    ------
-    Palette4dError
-        The output cannot be written, or a frame cannot be read.
+        What to draw: ``strength``, ``show`` and so on, as for `Document.recolour`.
     """
     if not isinstance(document, Document):
         document = Document.load(document)

@@ -1,4 +1,4 @@
-#include "fit/progressive_hull_4d.hpp"
+#include "fit/progressive_hull.hpp"
 
 #include <algorithm>
 #include <array>

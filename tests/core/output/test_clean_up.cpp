@@ -14,7 +14,7 @@
 #include "output/clean_up_kernels.hpp"
 #include "output/drawing.hpp"
 #include "shapes.hpp"
-#include "simd/kernel_choice.hpp"
+#include "simd/instruction_set.hpp"
 
 using namespace palette4d;
 using namespace shapes;

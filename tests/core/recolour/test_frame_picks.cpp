@@ -12,7 +12,7 @@
 #include "picks.hpp"
 #include "recolour/recolour.hpp"
 #include "shapes.hpp"
-#include "simd/kernel_choice.hpp"
+#include "simd/instruction_set.hpp"
 
 using namespace palette4d;
 using namespace images;

@@ -1,15 +1,110 @@
-#include "recolour/float_worker.hpp"
-
+// One thread's work: colour by colour in double, and many colours at a time.
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <iterator>
 #include <limits>
 
-#include "recolour/double_worker.hpp"
+#include "model/vec3.hpp"
+#include "recolour/recolour.hpp"
 #include "recolour/recolour_plan.hpp"
-#include "simd/kernel_choice.hpp"
 
 namespace palette4d {
+namespace {
+
+constexpr std::size_t kSlots = 2048;
+
+std::size_t slot(const Vec3& p) {
+    std::uint64_t hash = 0;
+    for (const double value : p) {
+        std::uint64_t bits;
+        std::memcpy(&bits, &value, sizeof bits);
+        hash = (hash ^ bits) * 0x9E3779B97F4A7C15u;
+        hash ^= hash >> 29;
+    }
+    return static_cast<std::size_t>((hash * 0x9E3779B97F4A7C15u) >> 53);
+}
+
+}  // namespace
+
+/// Precision::kDouble, colour by colour. Caches some displacements, since colours repeat in flat
+/// areas and in 8-bit images. They depend on the colour alone, so the cache does not change
+/// results.
+class DoubleWorker final : public RowWorker {
+public:
+    /// `recolourer` must outlive this and move some colour.
+    DoubleWorker(const Recolourer& recolourer, const RecolourOptions& options, int channels);
+
+    void row(const float* from, float* to, int width) override;
+    void finish() override {}
+    RecolourCounts counts() const override { return {0, 0, count_}; }
+    /// Recolours one pixel that is recolourable().
+    void recolour(const float* from, float* to);
+
+private:
+    struct Entry {
+        Vec3 colour, displacement;
+        bool known;
+    };
+
+    const Vec3& displacement(const Vec3& p);
+
+    const Recolourer& recolourer_;
+    const double strength_;
+    const bool divide_;
+    const int channels_;
+    const bool picks_;
+    const PickPlan<double> plan_;
+    std::vector<double> weights_;
+    PaletteBody::Workspace workspace_;
+    std::vector<Entry> memory_;
+    long long count_ = 0;
+};
+
+DoubleWorker::DoubleWorker(const Recolourer& recolourer, const RecolourOptions& options,
+                           int channels)
+    : recolourer_(recolourer),
+      strength_(options.strength),
+      divide_(options.premultiplied),
+      channels_(channels),
+      picks_(!recolourer.plan().twofold.picks.plan().empty()),
+      plan_(recolourer.plan().twofold.picks.plan()),
+      weights_(recolourer.original().size()) {}
+
+void DoubleWorker::row(const float* from, float* to, int width) {
+    for (int x = 0; x < width; ++x, from += channels_, to += channels_) {
+        if (channels_ == 4) to[3] = from[3];
+        if (recolourable(from, divide_)) {
+            recolour(from, to);
+        } else {
+            for (int c = 0; c < 3; ++c) to[c] = from[c];
+        }
+    }
+}
+
+void DoubleWorker::recolour(const float* from, float* to) {
+    ++count_;
+    const double alpha = divide_ ? from[3] : 1.0;
+    const Vec3& moved = displacement(straight_colour(from, divide_));
+    for (std::size_t c = 0; c < 3; ++c) {
+        // Equals multiplying the displaced colour by alpha, with less rounding.
+        const double step = alpha * (strength_ * moved[c]);
+        // Channels that do not move keep their bits, even a negative zero.
+        to[c] = step != 0 ? static_cast<float>(from[c] + step) : from[c];
+    }
+}
+
+const Vec3& DoubleWorker::displacement(const Vec3& p) {
+    if (memory_.empty()) memory_.assign(kSlots, Entry{{0, 0, 0}, {0, 0, 0}, false});
+    Entry& entry = memory_[slot(p)];
+    if (!entry.known || entry.colour != p) {
+        Vec3 moved = recolourer_.palette_displacement(p, weights_, workspace_);
+        if (picks_) moved = with_picks(recolourer_.picks_, plan_, p, moved);
+        entry = {p, moved, true};
+    }
+    return entry.displacement;
+}
 
 namespace {
 
@@ -20,9 +115,10 @@ void stay(const Plan<T>&, Block<T>& block, int, T, T, T*) {
     std::fill_n(block.verdict, Block<T>::kSize, T(1));
 }
 
-/// Collects pixels in blocks and sorts them into inside and outside the palette; one kernel for
-/// each computes the displacement. Pixels whose error a kernel cannot guarantee go to the next
-/// stage: float, double, one by one. A pixel's stage depends on its colour alone.
+/// Precision::kSingle. Collects pixels in blocks and sorts them into inside and outside the
+/// palette; one kernel for each computes the displacement. Pixels whose error a kernel cannot
+/// guarantee go to the next stage: float, double, one by one. A pixel's stage depends on its colour
+/// alone.
 class Pipeline final : public RowWorker {
 public:
     Pipeline(const Recolourer& recolourer, const RecolourOptions& options, int channels)
@@ -239,9 +335,11 @@ private:
 
 }  // namespace
 
-std::unique_ptr<RowWorker> float_worker(const Recolourer& recolourer,
-                                        const RecolourOptions& options, int channels) {
-    return std::make_unique<Pipeline>(recolourer, options, channels);
+std::unique_ptr<RowWorker> Recolourer::worker(const RecolourOptions& options, int channels) const {
+    if (options.precision == Precision::kDouble) {
+        return std::make_unique<DoubleWorker>(*this, options, channels);
+    }
+    return std::make_unique<Pipeline>(*this, options, channels);
 }
 
 }  // namespace palette4d
