@@ -4,6 +4,7 @@
 hues to the right, cold hues to the left, green in front.
 """
 
+import functools
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -92,7 +93,7 @@ class Shape:
     faces: NDArray[np.int32]
     pixels: F64 | None = None
 
-    @property
+    @functools.cached_property
     def edges(self) -> I64:
         """The (e, 2) edges; the line between them for two colours."""
         if not len(self.faces):
@@ -123,9 +124,11 @@ def facing(points: F64, faces: NDArray[np.int32]) -> NDArray[np.bool_]:
 def edges_of(faces: NDArray[np.int32]) -> tuple[I64, I64]:
     """Return the (e, 2) edges of a closed mesh, and the (e, 2) faces beside each; -1: none."""
     sides = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    edges, which = np.unique(sides.astype(np.int64), axis=0, return_inverse=True)
+    count = int(faces.max()) + 1
+    codes, which = np.unique(sides.astype(np.int64) @ [count, 1], return_inverse=True)
+    edges = np.stack(np.divmod(codes, count), axis=1)
     beside = np.full((len(edges), 2), -1, dtype=np.int64)
-    for side, edge in enumerate(which.ravel().tolist()):
+    for side, edge in enumerate(which.tolist()):
         beside[edge, 1 if beside[edge, 0] >= 0 else 0] = side % len(faces)
     return edges, beside
 

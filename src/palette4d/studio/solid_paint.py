@@ -51,6 +51,7 @@ class SolidPainter:
     def __init__(self, view: "SolidView") -> None:
         """Draw nothing yet."""
         self.view, self.session = view, view.session
+        self._spoilt: tuple[Palette, Spoilt] | None = None
 
     def paint(self) -> None:
         """Draw the solid."""
@@ -58,7 +59,7 @@ class SolidPainter:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.fillRect(self.view.rect(), QColor(style.PANEL))
         palette = self.view.palette_now()
-        spoilt = None if palette is None else troubles(palette)
+        spoilt = None if palette is None else self._troubles(palette)
         if palette is not None and spoilt is not None:
             self._paint_solid(painter, palette, spoilt)
         self._paint_words(painter, spoilt)
@@ -67,9 +68,15 @@ class SolidPainter:
 
     def words_width(self, palette: Palette) -> float:
         """Return the width of the words beside the solid; 0 if there is nothing to say."""
-        if not any(found.any() for found in troubles(palette)):
+        if not any(found.any() for found in self._troubles(palette)):
             return 0.0
         return min(WORDS, self.view.width() * 0.4)
+
+    def _troubles(self, palette: Palette) -> Spoilt:
+        """Return `troubles`, looked for once."""
+        if self._spoilt is None or self._spoilt[0] is not palette:
+            self._spoilt = palette, troubles(palette)
+        return self._spoilt[1]
 
     def _paint_solid(self, painter: QPainter, palette: Palette, spoilt: Spoilt) -> None:
         view = self.view.view_of(palette)
@@ -298,7 +305,7 @@ class SolidPainter:
 def troubles(palette: Palette) -> Spoilt:
     """Return which edges an edit makes concave, and which faces it turns inside out."""
     faces = palette.faces
-    if not len(faces):
+    if np.array_equal(palette.rgb, palette.edited) or not len(faces):
         return np.zeros(0, bool), np.zeros(0, bool)
     new = concave(palette.edited, faces) & ~concave(palette.rgb, faces)
     turned = flipped(palette.rgb, palette.edited, faces)

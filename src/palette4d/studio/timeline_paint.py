@@ -72,7 +72,6 @@ class TimelinePainter:
             painter.drawPixmap(0, 0, bands)
             self.strip.paint(painter)
             self._paint_lanes(painter)
-            self._paint_ruler(painter)
             self._paint_playhead(painter)
             painter.drawPixmap(0, 0, discs)
             self._paint_pointer(painter)
@@ -84,11 +83,13 @@ class TimelinePainter:
         painter.end()
 
     def _pictures(self) -> tuple[QPixmap, QPixmap]:
-        """Return the rows, and their discs; drawn again only when something in them changed."""
+        """Return the rows and the ruler, and the discs; drawn again only when they changed."""
         ratio = self.view.devicePixelRatioF()
         found = self.places.timeline
         key = (
             self.places.key,
+            self.places.scale,
+            self.session.marks,
             self.view.size(),
             ratio,
             self.places.top,
@@ -101,12 +102,14 @@ class TimelinePainter:
                 picture = QPixmap(self.view.size() * ratio)
                 picture.setDevicePixelRatio(ratio)
                 picture.fill(QColor(ground))
+                painter = QPainter(picture)
+                painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+                painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+                if not pictures:
+                    self._paint_ruler(painter)
                 if found is not None:
-                    painter = QPainter(picture)
-                    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-                    painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
                     draw(painter, *found)
-                    painter.end()
+                painter.end()
                 pictures.append(picture)
             self._picture = key, (pictures[0], pictures[1])
         return self._picture[1]

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 
 from palette4d.studio import texts, theme
 from palette4d.studio.choice import Choice
+from palette4d.studio.player import Region
 from palette4d.studio.preview import Picture, Request
 from palette4d.studio.session import Session
 from palette4d.studio.viewer import Viewer
@@ -115,7 +116,7 @@ class Playback(QObject):
         start = self._step + 1 + self._lead
         nexts = [self.nth(start + k) for k in range(AHEAD)]
         frames = list(dict.fromkeys(n for n in nexts if n is not None))
-        missing = [n for n in frames if self._picture(n) is None]
+        missing = [n for n in frames if self._picture(n, region) is None]
         player.want(missing, region.coarse)
         ready = [n for n in missing if player.has_small(n, region.coarse)]
         viewer.preview.roll([functools.partial(self._scene, n) for n in ready])
@@ -132,10 +133,8 @@ class Playback(QObject):
             session.play(0)
             return
         if self._started is None:
-            ready = sum(
-                (frame := self.nth(k)) is not None and self._picture(frame) is not None
-                for k in range(READY)
-            )
+            starts, region = (self.nth(k) for k in range(READY)), viewer.region()
+            ready = sum(n is not None and self._picture(n, region) is not None for n in starts)
             if ready < READY and now - self._began < PATIENCE:
                 return
             self._started, self._step = now, -1
@@ -149,7 +148,7 @@ class Playback(QObject):
             if frame is None:
                 session.play(0)
                 return
-            picture = self._picture(frame)
+            picture = self._picture(frame, viewer.region())
             if picture is not None:
                 self.dropped += count - self._step - 1
                 self.shown += 1
@@ -172,8 +171,8 @@ class Playback(QObject):
                 self._lead = min(self._lead + 2, AHEAD)
         self._ask()
 
-    def _picture(self, frame: int) -> Picture | None:
-        return self.viewer.preview.kept(self.viewer.film_key(frame))
+    def _picture(self, frame: int, region: Region | None) -> Picture | None:
+        return self.viewer.preview.kept(self.viewer.film_key(frame, region))
 
 
 class Transport(QWidget):

@@ -190,12 +190,12 @@ class Viewer(QWidget):
             return None
         return self._request_of(frame, region, NO_PIXELS, settled=False, scaled=True)
 
-    def film_key(self, frame: int) -> tuple[Any, ...]:
-        """Return `Request.key` of the request for a frame to play."""
+    def film_key(self, frame: int, region: Region | None) -> tuple[Any, ...]:
+        """Return `Request.key` of the request for a frame to play in `region()`."""
         session = self.session
         sides = frozenset(self.sides)
         before = self._before_key()
-        return self._clips, frame, self.region(), session.looked, sides, before, session.revision
+        return self._clips, frame, region, session.looked, sides, before, session.revision
 
     def _before_key(self) -> str:
         view = self.session.view
