@@ -23,7 +23,7 @@ U8 = NDArray[np.uint8]
 U32 = NDArray[np.uint32]
 
 #: The most pixels that are measured while something moves, and when nothing does.
-MOVING, RESTING = 140_000, 2_100_000
+MOVING, RESTING = 140_000, 240_000
 #: Columns of the waveform; a third of the parade has as many halves.
 COLUMNS = 480
 #: The brightness of a trace: this times the share of a column's pixels at a level, times the levels
@@ -107,13 +107,12 @@ def _brightness(shares: F32) -> U8:
 
 
 def _as_beam(counts: F32) -> F32:
-    """Return twice the counts with the width of a beam, along the last axis.
-
-    Code values of 8 bits leave gaps between levels.
-    """
-    result = counts.copy()
-    result[..., 1:-1] += np.float32(0.5) * (counts[..., 2:] + counts[..., :-2])
-    return result
+    """Return four times the counts with the width of a beam, which fills gaps between samples."""
+    tall = counts.copy()
+    tall[1:-1] += np.float32(0.5) * (counts[2:] + counts[:-2])
+    beam = tall.copy()
+    beam[:, 1:-1] += np.float32(0.5) * (tall[:, 2:] + tall[:, :-2])
+    return beam
 
 
 _TINTS: dict[float, NDArray[np.uint16]] = {}
@@ -123,7 +122,7 @@ def _vector_trace(counts: U32, count: float, zoom: float) -> U8:
     """Return the picture of the vectorscope; each bin has the hue that it stands for."""
     if zoom not in _TINTS:
         _TINTS[zoom] = _tints(len(counts), zoom)
-    beam = _as_beam(_as_beam(counts.astype(np.float32)).T).T
+    beam = _as_beam(counts.astype(np.float32))
     beam *= np.float32(len(counts) ** 2 * VECTOR_GAIN / 4 / count)
     return (_brightness(beam)[..., None] * _TINTS[zoom] >> 8).astype(np.uint8)
 
