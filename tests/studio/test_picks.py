@@ -19,6 +19,7 @@ from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QMouseEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
+from windows import Settle
 
 import palette4d
 from palette4d.cli.main import main
@@ -26,8 +27,9 @@ from palette4d.common.text import percent
 from palette4d.grade.answer import Answer, Note, Place
 from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.picks import Pick
-from palette4d.studio import grade_steps, states, theme
+from palette4d.studio import grade_steps, states, texts, theme
 from palette4d.studio.pick_panel import PickPanel
+from palette4d.studio.pixels import place_between
 from palette4d.studio.session import Session
 from palette4d.studio.window import Window
 
@@ -287,14 +289,17 @@ def test_what_speaks_against_a_pick_stands_in_its_panel(qtbot: Any, opened: Wind
     says(is_far=False)
 
 
-def test_the_matte_of_a_row_of_the_list_is_shown(qtbot: Any, opened: Window) -> None:
+def test_the_matte_of_a_row_of_the_list_is_shown(
+    qtbot: Any, opened: Window, settle: Settle
+) -> None:
     pick(qtbot, opened, 40, 30)
     session, rows = opened.session, opened.inspector.picks.list
     opened.resize(1200, 1400)  # all of the list is seen
+    settle(opened)  # the list is filled again, and where it stays
     item = rows.topLevelItem(0)
     assert item is not None
     QTest.mouseMove(rows.viewport(), rows.visualItemRect(item).center())
-    qtbot.waitUntil(lambda: session.hover == "p1")
+    assert session.hover == "p1"
     assert session.shown_matte == "p1"
     QApplication.sendEvent(rows.viewport(), QEvent(QEvent.Type.Leave))
     assert session.hover is None
@@ -376,20 +381,39 @@ def test_a_pick_that_is_undone_or_kept_while_it_is_followed(qtbot: Any, opened: 
     assert picks(opened) == (found,)
 
 
+@pytest.mark.parametrize("by", ["this window", "the next window"])
 def test_edits_that_follow_each_other_are_completed_in_their_order(
-    qtbot: Any, opened: Window, sidecar: Path
+    qtbot: Any, opened: Window, settle: Settle, sidecar: Path, by: str
 ) -> None:
     twin = Path(shutil.copy(sidecar, sidecar.with_name("twin.p4d.json")))
     session = opened.session
     qtbot.mouseClick(opened.viewer, LEFT, pos=at(opened, 40, 30).toPoint())
     opened.inspector.set_colour(np.array(NEW))
-    grade_steps.hold(session, states.Place(6, 120, 70, 5, (0.3, 0.4, 0.2)))
+    place = place_between(session, (118, 68), (122, 72))
+    assert place is not None
+    grade_steps.hold(session, place)
     grade_steps.set_range(session, "p1", 2, 9)
     grade_steps.shape_pick(session, "p1", False, reach=1.0)
     session.select("p2")
     grade_steps.reset(session)
     assert [len(picks(opened)), session.following] == [1, 4]
+    if by == "the next window":
+        assert session.save()
+        killed = sidecar.read_bytes()
+        qtbot.waitUntil(lambda: not session.following, timeout=60_000)
+        assert session.save()
+        assert not session.unfollowed
+        sidecar.write_bytes(killed)
+        session.revert()
+        settle(opened)
+        assert session.unfollowed == ["p1"]
+        button = opened.banner.button(texts.FOLLOW_NOW)
+        assert button is not None
+        qtbot.mouseClick(button, LEFT)
+        assert session.following == 4
     qtbot.waitUntil(lambda: not session.following, timeout=60_000)
+    settle(opened)
+    assert opened.banner.button(texts.FOLLOW_NOW) is None
     session.undo()
     assert session.save()
     for words in (

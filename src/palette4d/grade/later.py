@@ -2,16 +2,18 @@
 
 An edit with `Unread` for its clip leaves out what only the clip can tell: the path, and the matte.
 The same edit with the clip gives both. `completed` puts them into the step that was made at once,
-whatever was done, undone or kept as a version since.
+whatever was done, undone or kept as a version since. Until then the step's label says so, also to
+the next program: `unread` finds the steps of one that ended too early.
 """
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from palette4d.grade import edits
 from palette4d.grade.clip_of_picks import DIGITS, ClipOfPicks
+from palette4d.grade.document import Document, OfClip
 from palette4d.grade.edits import Change, Colour, Edit, Key, State
 from palette4d.grade.follow import Progress
 from palette4d.grade.grade import Grade
@@ -23,6 +25,8 @@ from palette4d.grade.picks import PathKey, Pick
 Found = tuple[tuple[Pick, Pick], ...]
 #: What a path and a matte depend on. A pick that differs in one of these is another one.
 _INPUTS = ("kind", "frame", "rgb", "pixel", "box", "areas", "whole_hue")
+#: Ends the label of a step whose clip is not read yet.
+NOT_YET = " (not followed yet)"
 
 
 class Unread(ClipOfPicks):
@@ -63,6 +67,55 @@ class Unread(ClipOfPicks):
         return pick.path
 
 
+def as_unread(history: History) -> History:
+    """Return the history whose last step says that its clip is not read yet."""
+    *earlier, step = history.done
+    return replace(history, done=(*earlier, replace(step, label=step.label + NOT_YET)))
+
+
+def as_read(step: Edit) -> Edit:
+    """Return a step that does not say so."""
+    return replace(step, label=step.label.removesuffix(NOT_YET))
+
+
+def is_unread(step: Edit) -> bool:
+    """Return whether a step says that its clip is not read yet."""
+    return step.label.endswith(NOT_YET)
+
+
+def unread(grade: Grade, history: History) -> Iterator[tuple[Grade, Grade, Edit]]:
+    """Yield the steps that are not completed, the first one first, with the grades around them."""
+    found, after = [], grade
+    for step in reversed(history.done):
+        before = grade.with_state(step.inverse().apply(after.state))
+        if is_unread(step):
+            found.append((before, after, step))
+        after = before
+    return reversed(found)
+
+
+def do_again(document: Document, step: Edit, clip: OfClip, progress: Progress | None) -> None:
+    """Do a step whose clip was not read, and read it."""
+    were = {change.id: change.before for change in step.changes if change.kind == "pick"}
+    with document.one_step(as_read(step).label):
+        document.grade = document.grade.after(step)
+        for pick in readers(step, document.grade):
+            new = were.get(pick.id, pick) is None
+            reads: dict[str, Any] = {"areas": pick.areas, "clip": clip, "progress": progress}
+            if new and pick.pixel is not None:  # its colour too is read with it
+                reads |= {"pixel": pick.pixel, "box": pick.box}
+            if pick.id in were and (new or pick.path):
+                reads["follow"] = True
+            document.change_pick(pick.id, **reads)
+
+
+def readers(step: Edit, grade: Grade) -> list[Pick]:
+    """Return the picks that a step reads the clip for: without a hold all are learned again."""
+    ids, picks = {change.id for change in step.changes if change.kind == "pick"}, grade.picks
+    gone = ids - {pick.id for pick in picks}
+    return [pick for pick in picks if gone or pick.id in ids]
+
+
 def found_in(clip: Grade, unread: Grade) -> Found:
     """Return the picks that an edit with the clip made different from those without it."""
     both = ((unread.state.get(key), value) for key, value in clip.of_kind("pick").items())
@@ -97,7 +150,7 @@ def completed(
     now = (with_found if is_done else _versions)(grade.state, found)
     if at is None:
         return grade.with_state(now), history.with_step(
-            edits.difference(grade.state, now, step.label).undoable()
+            edits.difference(grade.state, now, like.label).undoable()
         )
     before: State = grade.state
     for each in reversed(line[at:done]):

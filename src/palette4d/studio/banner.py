@@ -71,6 +71,7 @@ class Banner(QFrame):
         self._rows = QVBoxLayout(self)
         self._rows.setContentsMargins(10, 4, 6, 4)
         self._rows.setSpacing(2)
+        self._follow: Remedies = {texts.FOLLOW_NOW: session.follow}
         self._again = QTimer(self)
         self._again.setInterval(READ_AGAIN)
         self._again.timeout.connect(self.read_again)
@@ -124,6 +125,8 @@ class Banner(QFrame):
         display = session.display
         unknown = found[1] is not None and display is not None and not display.known
         self._state("encoding", unknown, texts.ASSUMED, self._change)
+        left = texts.UNFOLLOWED.format(ids=", ".join(ids := session.unfollowed))
+        self._state("follow", bool(ids), left, self._follow)
         again: Remedies = {texts.TRY_AGAIN: self._read_clip_again}
         self._state("frame", bool(problem), problem, again, "error")
         if problem and not self._again.isActive():

@@ -35,8 +35,8 @@ class Job:
 
     Attributes
     ----------
-    edit : callable
-        Does it.
+    edit : callable or None
+        Does it; None: `later.do_again` does, because another program began it.
     clip : str
         The clip.
     text : str
@@ -47,7 +47,7 @@ class Job:
         Its step in the history.
     """
 
-    edit: ClipEdit
+    edit: ClipEdit | None
     clip: str
     text: str
     before: Grade
@@ -106,7 +106,10 @@ class Follower:
                 session.post(lambda: session.say(words) if self._is_first(job) else None)
 
         try:
-            job.edit(trial, job.clip, say)
+            if job.edit is None:
+                later.do_again(trial, job.step, job.clip, say)
+            else:
+                job.edit(trial, job.clip, say)
         except Exception as error:  # whatever fails, the window stays
             failed = error
             session.post(lambda: self._failed(job, failed))
@@ -123,7 +126,7 @@ class Follower:
         found = later.found_in(done.grade, job.after)
         self._jobs.popleft()
         self._jobs = deque(each.with_found(found, done.grade) for each in self._jobs)
-        like = done.history.done[-1] if done.history.done else job.step
+        like = done.history.done[-1] if done.history.done else later.as_read(job.step)
         self._session.complete((job.step, like), found, done.grade.mattes)
         self._session.say(job.text)
         self._next()

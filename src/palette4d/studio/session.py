@@ -20,11 +20,11 @@ import fileseq  # noqa: F401
 
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.folders import state_folder
-from palette4d.grade import edits
+from palette4d.grade import edits, later
 from palette4d.grade.document import Document, OfClip
 from palette4d.grade.edits import Edit as Step
 from palette4d.grade.follow import Progress
-from palette4d.grade.later import Found, Unread, completed
+from palette4d.grade.later import Found, Unread
 from palette4d.media.clip import Clip, open_clip
 from palette4d.media.source_clip import find_clip
 from palette4d.studio import texts
@@ -264,19 +264,38 @@ class Session(Drafts):
         done = document.history.done
         step = edits.difference(before.state, document.grade.state).undoable()
         if clip is not None and step.changes and done[-1].changes == step.changes:
-            job = Job(operation, clip.source, text, before, document.grade, done[-1])
-            self._follower.add(job)
+            document.history = later.as_unread(document.history)
+            step = document.history.done[-1]
+            self._follower.add(Job(operation, clip.source, text, before, document.grade, step))
 
     @property
     def following(self) -> int:
         """How many edits are still reading the clip."""
         return len(self._follower)
 
+    @property
+    def unfollowed(self) -> list[str]:
+        """The picks that nobody reads the clip for: the program ended, or it could not."""
+        document = self._document
+        if document is None or self.clip is None or self.following:
+            return []
+        left = [step for step in document.history.done if later.is_unread(step)]
+        return sorted({pick.id for step in left for pick in later.readers(step, document.grade)})
+
+    def follow(self) -> None:
+        """Read the clip for the picks that are `unfollowed`."""
+        document, clip = self._document, self.clip
+        if document is None or clip is None:
+            return
+        for before, after, step in later.unread(document.grade, document.history):
+            text = texts.FOLLOWED.format(step=later.as_read(step).label)
+            self._follower.add(Job(None, clip.source, text, before, after, step))
+
     def complete(self, steps: tuple[Step, Step], found: Found, mattes: Mapping[str, str]) -> None:
         """Put what was found in the clip into a step, and go on with what is being dragged."""
         document, dragged = self._document, self._dragged
         assert document is not None
-        document.grade, document.history = completed(
+        document.grade, document.history = later.completed(
             document.grade, document.history, steps, found, mattes
         )
         self._note_edit()
