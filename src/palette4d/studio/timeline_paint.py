@@ -97,7 +97,7 @@ class TimelinePainter:
             self.session.looked,
         )
         if self._picture is None or self._picture[0] != key:
-            pictures = []
+            pictures: list[QPixmap] = []
             for draw, ground in ((self._paint_rows, style.PANEL), (self._paint_discs, "#00000000")):
                 picture = QPixmap(self.view.size() * ratio)
                 picture.setDevicePixelRatio(ratio)
