@@ -12,21 +12,10 @@ F64 = NDArray[np.float64]
 
 
 class ClipColours:
-    """The stored colours of a clip.
+    """The stored colours of a clip, from its palette and a sidecar's members.
 
-    Parameters
-    ----------
-    polytope : _core.Polytope
-        The palette; its colours stand for the clip's where none are stored.
-    fields : mapping
-        The members of a sidecar.
-
-    Attributes
-    ----------
-    frames : list of float
-        The frames with stored colours, in rising order.
-    colours : list of (n, 4) float64
-        Their colours and each one's share of the pixels.
+    `frames` are the frames with stored colours, in rising order; `colours` their (n, 4) colours,
+    with the share of the pixels of each.
     """
 
     def __init__(self, polytope: _core.Polytope, fields: Mapping[str, Any]) -> None:

@@ -17,15 +17,7 @@ Move = Callable[[Colour], Colour]
 
 @dataclass(frozen=True)
 class Range:
-    """A range of time with ramps.
-
-    Attributes
-    ----------
-    first, last : float
-        The frames between which the move is full.
-    fade, fade_out : float
-        Frames of the ramps before and after, more than 0.
-    """
+    """A range of time: the move is full from `first` to `last`, with ramps above 0 frames."""
 
     first: float
     last: float
@@ -85,13 +77,7 @@ def range_of(
     *,
     frames: tuple[int, int, int],
 ) -> Range | None:
-    """Return the range for frames that the user gave; None for the whole clip.
-
-    Raises
-    ------
-    Palette4dError
-        The range ends before it begins, does not meet the clip, or has a fade but no frames.
-    """
+    """Return the range for frames that the user gave; None for the whole clip."""
     first, last, step = frames
     if start is None and until is None:
         if fade is not None or fade_out is not None:
@@ -144,20 +130,14 @@ def moved(
 
     Parameters
     ----------
-    handles, settings
-        The palette, and the settings of its handles.
     way : (set of str, set of str)
         The vertices and edges whose colours move (`tracks.way_of`); or one stop.
-    move : callable
-        The move.
     colour_at : callable
         The user's colour of an edge at a frame inside it.
     within : Range, optional
         The range; None: the whole clip.
     ramp : str, optional
         The ramp of the handles that move; in a range: of its fades.
-    clip_ramp : str
-        The clip's ramp.
     exact : (str, float), optional
         An edge and a frame where the colour moves exactly, by a stop.
     """
@@ -190,16 +170,15 @@ def moved(
         for frame in sorted(times):
             if not knots[0][0] < frame < knots[-1][0] or any(at == frame for at, _ in knots):
                 continue
-            way_on = next(own for at, own in reversed(knots) if at < frame)
+            to_next = next(own for at, own in reversed(knots) if at < frame)
             colour = colour_at(edge, frame)
             if edge in edges:
                 share = 1.0 if within is None else within.weight(frame)
                 colour = _mixed(colour, move(colour), share)
-            begins_fade = within is not None and frame in (within.start, within.last)
-            if edge in edges and begins_fade:
-                way_on = ramp or ("linear" if (way_on or clip_ramp) == "hold" else way_on)
+                if within is not None and frame in (within.start, within.last):  # begins a fade
+                    to_next = ramp or ("linear" if (to_next or clip_ramp) == "hold" else to_next)
             id_ = new_id("s", {*handles.vertices, *handles.edges, *settings, *result})
-            result[id_] = Setting(colour, edge, frame, way_on)
+            result[id_] = Setting(colour, edge, frame, to_next)
     return result
 
 

@@ -50,11 +50,6 @@ _HEX = re.compile(r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})")
 def as_colour(values: Iterable[float] | str, what: str = "colour") -> Colour:
     """Return three finite code values, also from #rrggbb.
 
-    Raises
-    ------
-    Palette4dError
-        `values` are not three numbers of at most `LARGEST_COLOUR`.
-
     >>> as_colour("#ff0033")
     (1.0, 0.0, 0.2)
     """
@@ -74,13 +69,7 @@ def as_colour(values: Iterable[float] | str, what: str = "colour") -> Colour:
 
 
 def as_ramp(ramp: str) -> Ramp:
-    """Return a ramp as files name it.
-
-    Raises
-    ------
-    Palette4dError
-        It is neither one of `RAMPS` nor in `RAMP_WORDS`.
-    """
+    """Return a ramp as files name it, from its name in files or its word."""
     for known in RAMPS:
         if ramp in (known, RAMP_WORDS[known]):
             return known
@@ -89,12 +78,10 @@ def as_ramp(ramp: str) -> Ramp:
 
 @dataclass(frozen=True)
 class Setting:
-    """The user's setting for a handle.
+    """The user's setting for a handle: its colour, in the palette's code values, and more.
 
     Attributes
     ----------
-    rgb : tuple of float
-        The colour, in the palette's code values.
     edge, frame : str and float, or None
         The place of a stop; None for a vertex, which never moves in time.
     ramp : str or None
@@ -135,15 +122,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Edit:
-    """One undoable step: changes that belong together.
-
-    Attributes
-    ----------
-    changes : tuple of Change
-        At most one for each key.
-    label : str
-        What the step does, for people: "set v14 to #e66b9e".
-    """
+    """One undoable step: at most one change for each key, and a label: "set v14 to #e66b9e"."""
 
     changes: tuple[Change, ...]
     label: str = ""
@@ -154,13 +133,7 @@ class Edit:
         return replace(self, changes=back)
 
     def apply(self, state: State) -> dict[Key, Any]:
-        """Return the state after this edit.
-
-        Raises
-        ------
-        Palette4dError
-            A value has changed since this edit was made.
-        """
+        """Return the state after this edit; refuse a value that has changed since it was made."""
         result = dict(state)
         for change in self.changes:
             if result.get(change.key) != change.before:
@@ -175,13 +148,10 @@ class Edit:
         return result
 
     def undoable(self) -> "Edit":
-        """Return the edit without the versions that it makes: no step takes a version away.
-
-        A version that gets another name is not made.
-        """
+        """Return the edit without the versions that it makes: no step takes a version away."""
         changes = [c for c in self.changes if c.kind == "version"]
-        stay = (None, *(c.before for c in changes if c.after is None))
-        made = {c.id for c in changes if c.after not in stay}
+        renamed = (None, *(c.before for c in changes if c.after is None))
+        made = {c.id for c in changes if c.after not in renamed}
         kept = (c for c in self.changes if c.kind not in ("version", "note") or c.id not in made)
         return replace(self, changes=tuple(kept))
 
@@ -200,19 +170,10 @@ def difference(before: State, after: State, label: str = "") -> Edit:
 
 
 def merged(base: State, mine: State, theirs: State, taken: Collection[str]) -> dict[Key, Any]:
-    """Return the state with the changes of two writers.
+    """Return the state with the changes of two writers since `base`.
 
-    Parameters
-    ----------
-    base, mine, theirs : mapping
-        The common start, and the two changed states.
-    taken : collection of str
-        Ids of the palette, which stops must not use.
-
-    Raises
-    ------
-    Palette4dError
-        Both changed one value, or set a stop at one place, in different ways.
+    `taken` are ids of the palette, which stops must not use. An error where both writers changed
+    one value, or set a stop at one place, in different ways.
     """
     renamed: dict[Key, str] = {}
     result = dict(theirs)
@@ -221,7 +182,7 @@ def merged(base: State, mine: State, theirs: State, taken: Collection[str]) -> d
         if there == change.after:
             continue
         if there != change.before:
-            # Two new stops or picks with the same id by chance are two.
+            # Two new stops or picks may have the same id by chance.
             if change.before is not None or there is None or not _are_two(change, there):
                 raise _conflict(_named(key))
             used = [id_ for kind, id_ in (*result, *mine) if kind == change.kind]
@@ -232,10 +193,10 @@ def merged(base: State, mine: State, theirs: State, taken: Collection[str]) -> d
         _put(result, mine_renamed.key, mine_renamed.after)
     for key in [key for key in result if key[0] == "note" and ("version", key[1]) not in result]:
         del result[key]
-    places: dict[tuple[str, float], str] = {}
+    stops: dict[tuple[str, float], str] = {}
     for (kind, id_), value in result.items():
         place = _place(value) if kind == "handle" else None
-        if place and places.setdefault(place, id_) != id_:
+        if place and stops.setdefault(place, id_) != id_:
             raise _conflict(f"edge {place[0]} at frame {place[1]:g}")
     return result
 

@@ -69,8 +69,6 @@ def paths(
 
     Parameters
     ----------
-    clip : Clip
-        The clip; its frames are read once, in order.
     starts : list of (int, 3 floats)
         Frames where the colour is known, and the colour, in the palette's code values. Between two
         of them the path goes gradually from what follows the one to what follows the other.
@@ -78,19 +76,12 @@ def paths(
         First and last frame of interest.
     conversion : ColourConversion, optional
         From the clip's code values to the palette's.
-    progress : callable, optional
-        Called as progress(done, total) for each frame.
 
     Returns
     -------
     tuple of PathKey
         Keys in order of time; linear between them. The first and the last are at the ends of the
         span; keys at `starts` are marked as given. `there` falls to 0 where the path ends.
-
-    Raises
-    ------
-    Palette4dError
-        A start is no frame of the clip, or a frame cannot be read.
     """
     known = dict(sorted(starts))
     for frame in known:

@@ -51,18 +51,14 @@ class Grade:
 
     Attributes
     ----------
-    members : dict
-        The sidecar's members as analysed; its edits are those of the file.
-    analysed : Sidecar
-        The core's view of them.
-    handles : Handles
-        The palette's vertices and edges by id.
+    members, analysed : dict and Sidecar
+        The sidecar's members as analysed, with the edits of the file, and the core's view of them.
     path : Path or None
         The sidecar, beside which the clip is looked for.
     state : mapping
         Everything that the user set, by kind and id (`palette4d.grade.edits`).
     mattes : mapping of str to str
-        Texts of learned mattes by id, also of picks that are gone.
+        Texts of learned mattes by id, also of removed picks.
     label : str
         What the last change did, for people.
     """

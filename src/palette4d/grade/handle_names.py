@@ -16,18 +16,9 @@ from palette4d.grade.tracks import chains_of, runs_of
 def vertex_colours(
     vertices: Sequence[Mapping[str, Any]], edges: Iterable[Mapping[str, Any]], encoding: str
 ) -> list[str]:
-    """Return the name of each vertex's colour.
+    """Return the name of each vertex's colour; an unknown encoding counts as sRGB.
 
     Tracks that have a colour of one name at the same time get numbers, the lightest first.
-
-    Parameters
-    ----------
-    vertices : sequence of mapping
-        ``id``, ``rgb`` and ``frame``, as in the sidecar.
-    edges : iterable of mapping
-        ``from`` and ``to``.
-    encoding : str
-        The palette's encoding; unknown counts as sRGB.
     """
     named = named_lch([vertex["rgb"] for vertex in vertices], encoding)
     names = [name for _, name in named]

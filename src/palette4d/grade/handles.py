@@ -10,12 +10,8 @@ from palette4d.common.errors import Arg, Palette4dError
 class Handles:
     """The vertices and edges of a sidecar's polytope.
 
-    Attributes
-    ----------
-    vertices, edges : dict of str to dict
-        The sidecar's members by id, in the sidecar's order.
-    colours : dict of str to str
-        The names of the vertices' colours, once `handle_names.colours_by_id` has found them.
+    `vertices` and `edges` are the sidecar's members by id, in its order; `colours` the names of the
+    vertices' colours, once `handle_names.colours_by_id` has set them.
     """
 
     def __init__(self, polytope: Mapping[str, Any]) -> None:
@@ -24,13 +20,7 @@ class Handles:
         self.colours: dict[str, str] = {}
 
     def vertex(self, id_: str, others: Iterable[str] = ()) -> dict[str, Any]:
-        """Return a vertex.
-
-        Raises
-        ------
-        Palette4dError
-            No vertex has this id; the message names similar ids, also from `others`.
-        """
+        """Return a vertex. The error for an unknown id names similar ids, also from `others`."""
         if id_ in self.vertices:
             return self.vertices[id_]
         if id_ in self.edges:
@@ -49,13 +39,7 @@ class Handles:
         )
 
     def check_inside(self, edge: str, frame: float) -> None:
-        """Check that a stop's place is between the ends of an edge.
-
-        Raises
-        ------
-        Palette4dError
-            There is no such edge, or the frame is not strictly between its ends.
-        """
+        """Refuse a stop's place that is not strictly between the ends of an edge."""
         if edge not in self.edges:
             raise unknown(edge, "edge", self.edges)
         start, end = (self.vertices[self.edges[edge][name]] for name in ("from", "to"))

@@ -12,12 +12,7 @@ from palette4d.grade.grade import Grade
 class History:
     """The steps of a document, also those of earlier sessions.
 
-    Attributes
-    ----------
-    done : tuple of Edit
-        The steps that `undo` reverts, oldest first.
-    undone : tuple of Edit
-        The steps that `redo` applies again, the next one last.
+    `undo` reverts the last of `done`, `redo` applies the last of `undone` again.
     """
 
     done: tuple[Edit, ...] = ()
@@ -54,13 +49,7 @@ class File:
 def merged(
     file: File, mine: tuple[Grade, History], theirs: tuple[Grade, History]
 ) -> tuple[Grade, History]:
-    """Return another program's grade with my edits since the file was read, as one more step.
-
-    Raises
-    ------
-    Palette4dError
-        The palettes differ, or both changed one value in different ways.
-    """
+    """Return another program's grade with my edits since the file was read, as one more step."""
     (own, history), (other, steps) = mine, theirs
     if other.members["polytope"] != own.members["polytope"]:
         raise Palette4dError(

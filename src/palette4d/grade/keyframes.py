@@ -15,18 +15,8 @@ def needed(
 ) -> list[int]:
     """Return the indices of the keys that are needed (Douglas and Peucker).
 
-    Parameters
-    ----------
-    times : (n,)
-        Increasing.
-    values : (n, m)
-        The keys' values.
-    fixed : iterable of int
-        Keys that are kept in any case, beside both ends.
-    tolerance : float
-        The largest difference of a value from linear interpolation of the kept keys.
-    most : int, optional
-        At most so many keys beside the fixed ones; the largest differences count first.
+    `times` (n,) increase; `values` are (n, m). Both ends and the `fixed` keys are kept, and at most
+    `most` others. Values of the other keys differ from linear interpolation by up to `tolerance`.
     """
     kept = sorted({0, len(times) - 1, *fixed})
     limit = len(times) if most is None else most + len(kept)

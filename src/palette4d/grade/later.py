@@ -32,12 +32,7 @@ NOT_YET = " (not followed yet)"
 class Unread(ClipOfPicks):
     """A clip that is read later: nothing is learned or followed.
 
-    Parameters
-    ----------
-    colour : 3 floats, optional
-        The colour of the picked pixel, in the palette's code values.
-    learned : Learned, optional
-        What was learned for a new pick already.
+    Known are the colour of the picked pixel, and what was learned for a new pick already.
     """
 
     unread = True
@@ -131,17 +126,9 @@ def completed(
 ) -> tuple[Grade, History]:
     """Return a grade and its steps where a step has what was found in the clip.
 
-    Parameters
-    ----------
-    grade, history : Grade and History
-        As they are now: the step may be done or undone.
-    steps : (Edit, Edit)
-        The step that was made at once, and that of the same edit with the clip. Without the first
-        one in the history, what is found becomes a step of its own.
-    found : tuple of (Pick, Pick)
-        `found_in`.
-    mattes : mapping of str to str
-        Texts of the mattes that were learned.
+    `steps` are the step that was made at once, and that of the same edit with the clip. The first
+    may be done or undone; without it in the history, what is found becomes a step of its own.
+    `mattes` are the texts of the learned mattes by id.
     """
     grade, (step, like) = grade.with_mattes(mattes), steps
     line, done = [*history.done, *reversed(history.undone)], len(history.done)

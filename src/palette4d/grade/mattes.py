@@ -40,18 +40,10 @@ BRIGHTEST = 2.0
 
 @dataclass(frozen=True)
 class Learned:
-    """A matte that was learned.
+    """A learned matte: its id, and its text in the sidecar.
 
-    Attributes
-    ----------
-    id : str
-        A hash of the matte: equal mattes have one id.
-    text : str
-        The matte as the sidecar has it.
-    found : bool
-        Whether the frame has pixels of the colour.
-    share : float
-        Share of the frame's pixels, 0..1, that are connected with what was clicked on.
+    `found` says whether the frame has pixels of the colour; `share` is the share of its pixels that
+    are connected with what was clicked on.
     """
 
     id: str
@@ -67,21 +59,7 @@ def learn(
     read: ReadFrame,
     display: Display | None,
 ) -> Learned:
-    """Learn the matte of a pick or hold.
-
-    Parameters
-    ----------
-    pick : Pick
-        With its path, if its colour is followed.
-    holds : sequence of Pick
-        Holds that are background for this pick.
-    frames : sequence of int
-        The clip's frames.
-    read : callable
-        Reads a frame.
-    display : tuple or None
-        `display_curve` of the palette's encoding.
-    """
+    """Learn the matte of a pick or hold from `frames` of its clip; `holds` are background."""
     chosen = [_nearest(frames, pick.frame)]
     chosen += [_nearest(frames, area.frame) for area in pick.areas]
     seeded = list(dict.fromkeys(chosen))

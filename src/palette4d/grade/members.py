@@ -49,16 +49,8 @@ def with_state(
 ) -> Fields:
     """Return members with a state, its done and undone steps, and the mattes of its picks.
 
-    Without picks the file has the first version of the format, so that older programs read it.
-
-    Parameters
-    ----------
-    members : mapping
-        Whose palette and other members stay.
-    mattes : mapping of str to str
-        Texts of mattes by their ids; those that nothing uses are left out.
-    display : callable
-        `mattes.display_curve` of the palette's encoding.
+    Mattes (texts by their ids) that nothing uses are left out. Without picks the file has the first
+    version of the format, so that older programs read it.
     """
     result = {n: v for n, v in members.items() if n not in ("versions", "history", "mattes")}
     vertices = [vertex["id"] for vertex in members["polytope"]["vertices"]]
@@ -115,13 +107,7 @@ def _picks_of(steps: Iterable[Edit]) -> Iterator[Pick]:
 
 
 def history_of(members: Mapping[str, Any], name: str) -> tuple[tuple[Edit, ...], tuple[Edit, ...]]:
-    """Return the done and the undone steps.
-
-    Raises
-    ------
-    SidecarError
-        The member "history" is unusable; `name` is the file.
-    """
+    """Return the done and the undone steps; `SidecarError` with `name` if they are unusable."""
     parts = []
     for part in ("done", "undone"):
         try:
@@ -139,10 +125,7 @@ def history_of(members: Mapping[str, Any], name: str) -> tuple[tuple[Edit, ...],
 
 
 def bounded(steps: Sequence[Edit]) -> Sequence[Edit]:
-    """Return the newest steps, so that the file stays small.
-
-    They are at most `MOST_STEPS`, with fewer than `MOST_TEXT` characters or only the newest.
-    """
+    """Return the newest steps within `MOST_STEPS` and `MOST_TEXT`, the last one in any case."""
     kept, length = 0, 0
     for step in reversed(steps[-MOST_STEPS:]):
         length += len(json.dumps(_step_fields(step, ())))

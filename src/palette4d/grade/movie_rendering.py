@@ -23,15 +23,7 @@ from palette4d.media.timecode import moved, start_timecode
 
 @dataclass(frozen=True)
 class MoviePlan:
-    """A movie that will be written.
-
-    Attributes
-    ----------
-    path, size, rate : of the movie; size is that of the picture.
-    delivery, sound : how it is written, and the sound that is copied.
-    premultiplied : whether the colours of the clip are multiplied by alpha.
-    notes : for the user, what the movie cannot keep.
-    """
+    """A movie that will be written; `notes` say what it cannot keep."""
 
     path: Path
     size: tuple[int, int]

@@ -58,11 +58,6 @@ class Output:
         The share of the change by picks that is filtered along the picture's edges, 0..1, so that
         codec blocks, soft chroma and rims do not show. The image must be the whole picture: its
         lower left corner is where the filter's cells begin.
-
-    Raises
-    ------
-    Palette4dError
-        A value is none of these.
     """
 
     show: str = "recoloured"
@@ -131,15 +126,7 @@ class Output:
         space: Space,
         threads: int,
     ) -> F32:
-        """Draw a frame, (h, w, 3 or 4) float32, with its palette and its edit.
-
-        `picks` are the ids of the picks and holds.
-
-        Raises
-        ------
-        Palette4dError
-            The sidecar has no such handle, pick or hold.
-        """
+        """Draw a frame, (h, w, 3 or 4) float32; `picks` are the ids of the picks and holds."""
         own = sidecar.conversion if space == "input" else None
         encoding = own.input_space if own else sidecar.clip["encoding"]
         map = self._reader(sidecar, palette, picks) or edit

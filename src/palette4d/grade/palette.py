@@ -60,16 +60,12 @@ class Near:
 
     Attributes
     ----------
-    frame : float
-        The given time.
     id : str
         The vertex or edge that the palette colour lies on.
     handle : str or None
         The existing vertex or stop; None: the edit needs a new stop on edge `id`.
-    rgb : tuple of float
-        The edited palette colour.
-    distance : float
-        Euclidean distance to the given colour, in RGB code values.
+    rgb, distance : 3 floats and float
+        The edited palette colour, and its distance to the given colour, in RGB code values.
     shares : list of (str, float)
         `Palette.shares` of the given colour.
     """

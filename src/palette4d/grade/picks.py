@@ -263,13 +263,7 @@ class Pick:
 
 
 def check(pick: Pick, frames: tuple[int, int, int]) -> None:
-    """Refuse a pick whose range is empty or outside the clip, or whose values are out of range.
-
-    Raises
-    ------
-    Palette4dError
-        As said.
-    """
+    """Refuse a pick whose range is empty or outside the clip, or whose values are out of range."""
     first, last, _ = frames
     start = first if pick.start is None else pick.start
     until = last if pick.until is None else pick.until

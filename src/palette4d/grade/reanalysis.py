@@ -26,16 +26,6 @@ def save(fields: Fields, path: Path, *, on_edits: OnEdits = "refuse") -> tuple[S
     With `on_edits` "keep" and another palette than before, the edits stay with their handles if
     these are the same (`analyze --like`). Else the grade is copied to the new palette, with its
     versions and picks, and the old file is kept under another name.
-
-    Parameters
-    ----------
-    fields, path, on_edits
-        As for `sidecar.save`.
-
-    Raises
-    ------
-    Palette4dError
-        As `sidecar.save`; or the grade cannot be copied.
     """
     target = link_target(path)
     old = sidecar.existing(target, on_edits) if on_edits == "keep" else None
@@ -78,19 +68,16 @@ def _copied(former: Grade, new: Grade) -> tuple[Grade, list[str]]:
 
 
 def _with_same_handles(old: Grade, new: Grade) -> Grade | None:
-    """Return the new palette with the old edits, if it is the old one, moved, and they fit.
-
-    Two palettes that were found may have the same ids for other colours.
-    """
+    """Return the new palette with the old edits, if `analyze --like` moved the old one to it."""
     method = new.members.get("quality", {}).get("options", {}).get("method")
     if method != _MOVED or _handles(old.members) != _handles(new.members):
         return None
-    found = new.with_mattes(old.mattes).with_state(old.state)
+    moved = new.with_mattes(old.mattes).with_state(old.state)
     try:
-        sidecar.validate(found.fields())
+        sidecar.validate(moved.fields())
     except SidecarError:  # a handle has moved in time beyond an edit
         return None
-    return found
+    return moved
 
 
 def _handles(document: Fields) -> tuple[Any, ...]:

@@ -400,7 +400,7 @@ def with_surroundings(
 
 
 def refuse_codec(output: str, codec: str | None, crf: int | None) -> None:
-    """Raise an error if frames are asked for with the options of a movie."""
+    """Refuse the options of a movie for frames."""
     if codec is not None or crf is not None:
         raise OutputError(
             f"output {output}: {Arg('codec')} and {Arg('crf')} are for movies, not for frames"

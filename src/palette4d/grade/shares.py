@@ -17,12 +17,7 @@ F64 = NDArray[np.float64]
 class Share:
     """How much of the picture a track moves: its mean weight for the pixels, 0..1.
 
-    Attributes
-    ----------
-    mean : float
-        Over the frames that have the track; 0 if none has it.
-    most, frame : float
-        The largest, and its frame.
+    `mean` is over the frames that have the track; `most` is the largest, at `frame`.
     """
 
     mean: float

@@ -33,24 +33,9 @@ def new_document(
     polytope: Mapping[str, Any],
     quality: Mapping[str, Any] | None = None,
 ) -> Fields:
-    """Return a document without edits from the analysis' results.
+    """Return a document without edits from the analysis' members (docs/sidecar.md).
 
-    Parameters
-    ----------
-    clip : mapping
-        ``name``, ``source``, ``frames`` (``first``, ``last``, ``step``, ``skipped``), ``rate``
-        (numerator, denominator), ``size`` (width, height in pixels), ``encoding``, and
-        ``conversion`` if the palette's colour space differs from the clip's.
-    polytope : mapping
-        ``vertices``, ``edges``, ``blocks``, ``transitions`` as in `docs/sidecar.md`.
-    quality : mapping, optional
-        ``stages``, ``options``, ``versions``; each may be missing.
-
-    Returns
-    -------
-    dict
-        Plain dicts, lists, texts and numbers (NumPy values are converted). Not yet validated:
-        `save` does that.
+    It has plain dicts, lists, texts and numbers; NumPy values are converted. `save` validates it.
     """
     quality = quality or {}
     document: Fields = {
@@ -68,35 +53,17 @@ def new_document(
 
 
 def dumps(document: Mapping[str, Any]) -> str:
-    """Return the document's text: equal documents give equal text, one row per line.
-
-    Raises
-    ------
-    SidecarError
-        As `validate`.
-    """
+    """Return the text of a valid document: equal documents give equal text."""
     return _core.encode_sidecar(document)[1].decode("utf-8")
 
 
 def validate(document: Mapping[str, Any], name: str = "<document>") -> _core.Sidecar:
-    """Return the core's view of a document.
-
-    Raises
-    ------
-    SidecarError
-        Naming `name`, the JSON pointer, what was found and what was expected.
-    """
+    """Return the core's view of a document; `SidecarError` with `name` if it is not valid."""
     return _core.encode_sidecar(document, name)[0]
 
 
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
-    """Return a file's bytes without validation.
-
-    Raises
-    ------
-    SidecarError
-        The file is missing or cannot be read, or is a picture or a movie.
-    """
+    """Return a file's bytes; `SidecarError` for pictures, movies and what cannot be read."""
     kind = Path(path).suffix.lower().lstrip(".")
     if kind in IMAGE_EXTENSIONS | MOVIE_EXTENSIONS and Path(path).is_file():
         what = "a picture" if kind in IMAGE_EXTENSIONS else "a movie"
@@ -120,13 +87,7 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
 
 
 def load(path: str | os.PathLike[str]) -> Fields:
-    """Read the members of a sidecar that the core accepts.
-
-    Raises
-    ------
-    SidecarError
-        When there is no such file or the core refuses it.
-    """
+    """Read the members of a sidecar; `SidecarError` where the core refuses it."""
     return decoded(read_bytes(path), os.fspath(path))[1]
 
 
@@ -159,14 +120,7 @@ def has_edits(document: Mapping[str, Any]) -> bool:
 
 
 def check_target(path: str | os.PathLike[str], *, on_edits: OnEdits = "refuse") -> None:
-    """Raise the errors of `save` before a long analysis, where they are certain.
-
-    Raises
-    ------
-    Palette4dError
-        When `path` holds edits and `on_edits` is "refuse", holds something that is not a sidecar
-        and `on_edits` is not "drop", or lies in a folder that cannot be written.
-    """
+    """Raise the errors of `save` before a long analysis, where they are certain."""
     target = link_target(path)
     refuse_existing(target, force=True)
     old = existing(target, on_edits)
@@ -188,8 +142,6 @@ def save(
 
     Parameters
     ----------
-    document : mapping
-        As `new_document` returns it.
     path : path
         A symbolic link is followed; permissions of an existing file are kept.
     on_edits : {"refuse", "keep", "drop"}
@@ -198,13 +150,6 @@ def save(
         `grade.reanalysis` copies grades to another polytope.
     replaces : bytes, optional
         The expected content of the file; another one is an error.
-
-    Raises
-    ------
-    Palette4dError
-        When edits would be lost, or the file cannot be written.
-    SidecarError
-        When the core refuses the document.
     """
     members: Fields = _core.plain(document, os.fspath(path))
     target = link_target(path)
@@ -225,26 +170,13 @@ def write(
 ) -> None:
     """Replace a file's content by the bytes of a validated document.
 
-    Parameters
-    ----------
-    target : Path
-        The file; the caller holds its lock.
-    data : bytes
-        The new content.
-    held : callable
-        The check of the lock, from `locked`.
-    replaces : bytes, optional
-        The expected old content, checked just before the rename: other programs ignore the lock.
-
-    Raises
-    ------
-    Palette4dError
-        The file holds something else, or cannot be written.
+    The caller has the lock of `target`, which `held` checks. `replaces`, the expected old content,
+    is checked just before the rename: other programs ignore the lock.
     """
 
     def unchanged() -> None:
         held()
-        if replaces is not None and _bytes_or_none(target) != replaces:
+        if replaces is not None and (not target.exists() or target.read_bytes() != replaces):
             raise Palette4dError(
                 f"{target} was changed by another program meanwhile; nothing was written. Try again"
             )
@@ -256,21 +188,16 @@ def write(
 # ----------------------------------------------------------------------------------- edits at stake
 
 
-def same_palette(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Return whether two documents have the same polytope, so that edits of one fit the other."""
-    return bool(_core.plain(one["polytope"]) == _core.plain(other["polytope"]))
+def same_palette(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
+    """Return whether two documents have the same polytope, so that the edits fit both."""
+    return bool(_core.plain(old["polytope"]) == _core.plain(new["polytope"]))
 
 
 def existing(target: Path, on_edits: OnEdits) -> Saved | None:
     """Return what a save would replace; None if no edits would be lost."""
     if on_edits not in ("refuse", "keep", "drop"):
         raise ValueError(f"on_edits: found {on_edits!r}, expected 'refuse', 'keep' or 'drop'")
-    try:
-        if target.stat().st_size == 0:
-            return None
-    except FileNotFoundError:
-        return None
-    if on_edits == "drop":
+    if on_edits == "drop" or not target.exists() or target.stat().st_size == 0:
         return None
     try:
         data = read_bytes(target)
@@ -312,13 +239,3 @@ def _with_edits_of(old: Fields, new: Fields, target: Path) -> Fields:
     names = ("edits", "mattes", "versions", "history")
     users = {name: old[name] for name in names if name in old}
     return {**new, **users, "extra": new.get("extra") or old["extra"]}
-
-
-# ------------------------------------------------------------------------------------------- files
-
-
-def _bytes_or_none(path: Path) -> bytes | None:
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        return None

@@ -20,16 +20,9 @@ F64 = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Chain:
-    """A palette colour through time.
+    """A palette colour through time: vertices, edges, and the first and last frame with forks.
 
-    Attributes
-    ----------
-    vertices : tuple of int
-        Vertices in this chain's row, in order of time.
-    edges : tuple of int
-        Its edges, in order of time; the outer ones may end on another chain's vertex.
-    first, last : float
-        The first and last frame, with forks.
+    The outer edges may end on another chain's vertex.
     """
 
     vertices: tuple[int, ...]
@@ -174,12 +167,8 @@ class Track:
 def tracks_of(handles: Handles, colours: Mapping[str, str]) -> list[Track]:
     """Return the tracks of a palette; every vertex and every edge belongs to exactly one.
 
-    Tracks of one name and the same frames, such as forks between tracks, get numbers.
-
-    Parameters
-    ----------
-    colours : mapping of str to str
-        The names of the vertices' colours.
+    `colours` are the names of the vertices' colours by id. Tracks of one name and the same frames,
+    such as forks between tracks, get numbers.
     """
     ids, edge_ids = list(handles.vertices), list(handles.edges)
     rgb = [vertex["rgb"] for vertex in handles.vertices.values()]

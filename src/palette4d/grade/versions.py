@@ -5,17 +5,15 @@ edits which were in the way have now.
 """
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from palette4d.common.errors import Palette4dError
 from palette4d.grade.edits import Key
 from palette4d.grade.grade import Grade
 
-#: The most characters of a version's name.
-LONGEST_NAME = 100
-#: The most characters of a note.
-LONGEST_NOTE = 300
+#: The most characters of a version's name, and of a note.
+LONGEST_NAME, LONGEST_NOTE = 100, 300
 
 
 def save_version(grade: Grade, name: str) -> tuple[Grade, str | None]:
@@ -95,10 +93,6 @@ def _nothing_of(name: str) -> dict[Key, None]:
 
 def free_name(grade: Grade, name: str) -> str:
     """Return a name that no version has."""
-    names = (name[: LONGEST_NAME - 4] + more for more in _suffixes())
+    suffixes = itertools.chain([""], (f" {number}" for number in itertools.count(2)))
+    names = (name[: LONGEST_NAME - 4] + suffix for suffix in suffixes)
     return next(candidate for candidate in names if candidate not in grade.versions)
-
-
-def _suffixes() -> Iterator[str]:
-    yield ""
-    yield from (f" {number}" for number in itertools.count(2))
