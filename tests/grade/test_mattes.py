@@ -248,6 +248,6 @@ def test_a_log_clip_is_told_apart_as_its_picture_is(pictures: F32) -> None:
         r, g, b = box.tolist()
         pick = Pick("p1", "pick", 0, (r, g, b), (0.1, 0.2, 0.7), pixel=CLICK, box=9)
         learned = mattes.learn(pick, (), [0], {0: image}.__getitem__, display)
-        assert learned.found
+        assert learned.seen
         taken.append(learned.share)
     assert taken[0] == pytest.approx(taken[1], rel=0.05)

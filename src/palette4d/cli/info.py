@@ -148,7 +148,7 @@ def _track(
     edited += [id_ for edge in track.edges for id_ in on_edge[edge]]
     inside = {*track.vertices, *track.edges}
     found = []
-    frames = [track.at, track.first]
+    frames = [track.frame, track.first]
     for frame in [*frames, *(document.grade.frame_of(id_) for id_ in edited)]:
         palette, places = palette_of(float(frame))
         few = inside if len(inside) < len(places) else [id_ for id_ in places if id_ in inside]

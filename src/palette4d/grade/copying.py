@@ -29,14 +29,14 @@ from palette4d.grade.versions import with_active_kept
 F64 = NDArray[np.float64]
 Time = Literal["relative"] | float
 
-#: Smaller changes of a handle are rounding errors of 32-bit floats.
+#: Smaller changes of a handle, in code values, are treated as zero: floats round by as much.
 LEAST = 1e-6
-#: Colours farther than this from the source's palette are not in its clip.
+#: Distance in code values from the source's palette above which a colour is not in its clip.
 NEAR = 0.05
-#: A copy fits if it differs by less than this share of what the grade changes; up to one step of 8
-#: bits, by less than the larger share. A tenth of a step is rounding.
+#: Largest differences of a copy that fits, as shares of the grade's mean change: the second
+#: while the difference is below a step of 8 bits. A tenth of such a step is rounding.
 FITS, FITS_BELOW_A_STEP, ROUNDING = 0.3, 0.5, 0.1 / 255
-#: At most this many stops an edge.
+#: Most stops of an edge.
 MOST_STOPS = 64
 
 

@@ -31,7 +31,7 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 Key = tuple[Kind, str]
 State = Mapping[Key, Any]
 
-#: The kinds that recolouring uses; versions wait, and their notes are for people.
+#: The kinds that recolouring uses.
 ACTIVE: tuple[Kind, ...] = ("handle", "ramp", "pick", "lock")
 
 #: The key of the clip's ramp.
@@ -40,8 +40,8 @@ RAMP: Key = ("ramp", "")
 #: The largest absolute code value that the file format allows (docs/sidecar.md).
 LARGEST_COLOUR = 1e6
 
-#: Differences up to this, three steps of 8 bits, are not seen in a graded picture: keys of a path
-#: and stops of a copy that change less are left out, and picks that miss by more are reported.
+#: Tolerance in code values, three steps of 8 bits, that is not seen in a graded picture: keys of a
+#: path and stops of a copy that change less are left out.
 VISIBLE = 3 / 255
 
 _HEX = re.compile(r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})")

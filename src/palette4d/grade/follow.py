@@ -1,9 +1,9 @@
 """Following: where a picked colour is at the other frames of its clip.
 
 Input: a clip, a colour at a frame, and the frames of interest. Output: a path of a few keys. From
-each frame to the next the colour moves with the mean of its near pixels (mean shift, with a
-Gaussian of `ALIKE`). The path ends where the number of near pixels shows that they are another
-thing's. One pass reads the frames; memory holds at most `MOST_COLOURS` colours for at most
+each frame to the next the colour moves with the weighted mean of its neighbours (mean shift, with a
+Gaussian of `ALIKE`). The path ends where the number of neighbours shows that they are another
+object's. One pass reads the frames; memory holds at most `MOST_COLOURS` colours for at most
 `MOST_FRAMES` frames.
 """
 
@@ -26,25 +26,25 @@ F64 = NDArray[np.float64]
 Progress = Callable[[int, int], object]
 """Called as progress(done, total)."""
 
-#: Digits of a path's code values and shares. A step of the mean shift below the last one ends it.
+#: Digits of a path's code values and shares. Steps of the mean shift below the last digit end it.
 DIGITS = 4
 #: Rounds of the mean shift from one frame to the next. With 100, 15 of 140 paths slide to another
 #: colour (docs/lab/picks.md).
 ROUNDS = 8
-#: Weight of the path's bends, in frames^4: jitter shorter than 2 pi STIFF^(1/4) = 12 frames is
-#: smoothed, since it would be flicker of the grade. Larger: late where a light changes.
+#: Weight of the path's curvature, in frames^4: jitter shorter than 2 pi STIFF^(1/4) = 12 frames is
+#: smoothed, else the grade would flicker. Larger: the path is late where a light changes.
 STIFF = 12.0
-#: Weight of the colours that the user gave, against 1 for the others: they are met.
+#: Weight of the colours that the user gave, against 1 for the others, so that they are met.
 PINNED = 1e6
-#: A path returns to its first colour by this share of the way in each frame, while as many pixels
-#: as at first are near that. Without it, 34 of 140 paths drift by more than 0.05.
+#: Share of the way back to its first colour that a path goes in each frame, while that has as many
+#: neighbours as at first. Without it, 34 of 140 paths drift by more than 0.05.
 HOME = 0.5
-#: Ratios of the number of near pixels to that at the start. Beyond OTHER they are another thing's,
-#: at once; where the colour has moved by FAR or more (code values), beyond SAME. SAME is also the
-#: ratio at which HOME has faded to 0. From 7 to 20, OTHER changes five of 140 paths.
+#: Largest ratios of the number of neighbours to that at the start: beyond OTHER they are another
+#: object's; beyond SAME, where the colour has moved by FAR or more (code values). At SAME, HOME has
+#: faded to 0. From 7 to 20, OTHER changes five of 140 paths.
 OTHER, SAME, FAR = 12.0, 2.0, 0.5
-#: Share of a frame's pixels below which a colour is out of sight, and stays where it was: the mean
-#: of so few pixels is that of other things'.
+#: Least share of a frame's pixels that are neighbours. Below, the colour is out of sight and stays
+#: where it was: the mean of so few pixels is another object's.
 LEAST_SHARE = 1e-5
 
 #: In a longer range every n-th frame is read.
@@ -53,7 +53,7 @@ MOST_FRAMES = 600
 MOST_COLOURS = 2048
 #: Most keys of a path beside the given ones; longer paths are simplified further.
 MOST_KEYS = 48
-#: Smoothing overshoots a fade's ends by less than this share; within it a path is there, or is not.
+#: Tolerance of `there` at 0 and 1: smoothing overshoots the ends of a fade by less.
 OVERSHOOT = 0.05
 
 
@@ -159,28 +159,26 @@ def _joined(
 def _followed(colours: Sequence[tuple[F64, F64]], start: F64) -> F64:
     """Return the (n, 4) path from a colour in the first frame to the last frame.
 
-    The fourth column is 1 while the colour is there, and 0 where its near pixels are another
-    thing's. From there on the path has ended, unless it returns to its start.
+    The fourth column is 1 while the colour is there, and 0 where its neighbours are another
+    object's. From there on the path has ended, unless it returns to its start.
     """
-    home = _near(start, *colours[0])
+    first = _near(start, *colours[0])
     path, seen, alive = [start], [1.0], True
     for before, after in itertools.pairwise(colours):
         colour = _shifted(path[-1], before, after)
-        still = _near(start, *after)
-        if home is not None and still is not None:
-            # While as many pixels as at first are near the start, the colour is still there:
-            # without this, small errors would add up in a still picture.
-            ratio = min(still[1] / home[1], home[1] / still[1])
-            returned = start + still[0] - home[0]
+        now = _near(start, *after)
+        if first is not None and now is not None:
+            # Without this, small errors would add up in a still picture.
+            ratio = min(now[1] / first[1], first[1] / now[1])
+            returned = start + now[0] - first[0]
             colour = colour + HOME * max(0.0, 1 - (1 - ratio) * SAME) * (returned - colour)
         path.append(colour)
         near = _near(colour, *after)
         moved = float(np.linalg.norm(colour - start))
-        # The farther it has moved, the more it must be as large as at first: else it has slid over
-        # to another thing.
+        # A colour that has moved far with another number of neighbours has slid to another object.
         far = min(1.0, moved / FAR)
         allowed = OTHER ** (1 - far) * SAME**far
-        ratio = 1.0 if home is None or near is None else near[1] / home[1]
+        ratio = 1.0 if first is None or near is None else near[1] / first[1]
         other = not 1 / allowed <= ratio <= allowed
         alive = not other and (moved < ALIKE or alive)
         seen.append(float(alive))
@@ -188,10 +186,10 @@ def _followed(colours: Sequence[tuple[F64, F64]], start: F64) -> F64:
 
 
 def _without_drift(path: F64, start: F64) -> F64:
-    """Return (n, 3) colours of a path that stays at its start while it is as near as `ALIKE`.
+    """Return (n, 3) colours of a path that stays at its start while it is within `ALIKE` of it.
 
-    So far the mean of one thing's pixels moves in a still light, as others pass by. From twice as
-    far on the path is as it was found.
+    The mean of one object's pixels moves as far in a still light, as others pass by. Beyond twice
+    that distance the path is unchanged.
     """
     away = path - start
     length = np.linalg.norm(away, axis=1, keepdims=True)
@@ -210,30 +208,27 @@ def _smoothed(path: F64, fixed: Sequence[int]) -> F64:
     return np.asarray(smooth, np.float64)
 
 
-def _shifted(here: F64, before: tuple[F64, F64], after: tuple[F64, F64]) -> F64:
-    """Return where a colour of one frame is in the next one (mean shift).
-
-    It moves by `ALIKE` at most: what jumps farther is another thing.
-    """
-    near = _near(here, *before)
+def _shifted(colour: F64, before: tuple[F64, F64], after: tuple[F64, F64]) -> F64:
+    """Return where a colour is in the next frame (mean shift), at most `ALIKE` away."""
+    near = _near(colour, *before)
     if near is None:
-        return here
-    offset, there = near[0] - here, here
+        return colour
+    offset, new = near[0] - colour, colour
     for _ in range(ROUNDS):
-        near = _near(there, *after)
+        near = _near(new, *after)
         if near is None:
-            return here
-        step = near[0] - offset - there
-        there = there + step
+            return colour
+        step = near[0] - offset - new
+        new = new + step
         if np.abs(step).max() < 10.0**-DIGITS:
             break
-    length = float(np.linalg.norm(there - here))
-    moved: F64 = here + (there - here) * min(1.0, ALIKE / max(length, ALIKE))
+    length = float(np.linalg.norm(new - colour))
+    moved: F64 = colour + (new - colour) * min(1.0, ALIKE / max(length, ALIKE))
     return moved
 
 
 def _near(colour: F64, rgb: F64, counts: F64) -> tuple[F64, float] | None:
-    """Return the mean of a frame's pixels near a colour, and their share; None for hardly any."""
+    """Return the mean of a colour's neighbours in a frame, and their share; None if too few."""
     weight = counts * np.exp(((rgb - colour) ** 2).sum(axis=1) / (-2 * ALIKE**2))
     total, share = float(weight.sum()), float(weight.sum() / counts.sum())
     return (weight @ rgb / total, share) if share >= LEAST_SHARE else None

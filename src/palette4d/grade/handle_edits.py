@@ -26,7 +26,7 @@ from palette4d.grade.handles import unknown
 from palette4d.grade.palette import FAR, Near
 from palette4d.grade.tracks import way_of
 
-#: A vertex that has less of the colour at a frame than this is left alone: it would move too far.
+#: Least weight of a vertex at a frame for moving it: with less it would move too far.
 LEAST_SHARE = 0.5
 
 

@@ -22,8 +22,8 @@ from palette4d.grade.mattes import Display, Learned
 from palette4d.grade.picks import PathKey, Pick
 
 #: A pick before and after the clip was read.
-Found = tuple[tuple[Pick, Pick], ...]
-#: What a path and a matte depend on. A pick that differs in one of these is another one.
+Readings = tuple[tuple[Pick, Pick], ...]
+#: What a path and a matte depend on: a pick that differs in one of these is another pick.
 _INPUTS = ("kind", "frame", "rgb", "pixel", "box", "areas", "whole_hue")
 #: Ends the label of a step whose clip is not read yet.
 NOT_YET = " (not followed yet)"
@@ -36,12 +36,11 @@ class Unread(ClipOfPicks):
     """
 
     unread = True
+    missing = False  # an edit that needs the clip is tried with it later
 
     def __init__(self, colour: Iterable[float] = (), learned: Learned | None = None) -> None:
         super().__init__({}, None, None)
         self._colour, self._learned = tuple(colour), learned
-
-    missing = False  # an edit that needs the clip is tried with it later
 
     def colour(self, frame: float, pixel: tuple[float, float], box: int) -> Colour:
         """Return the colour that is known."""
@@ -80,13 +79,13 @@ def is_unread(step: Edit) -> bool:
 
 def unread(grade: Grade, history: History) -> Iterator[tuple[Grade, Grade, Edit]]:
     """Yield the steps that are not completed, the first one first, with the grades around them."""
-    found, after = [], grade
+    waiting, after = [], grade
     for step in reversed(history.done):
         before = grade.with_state(step.inverse().apply(after.state))
         if is_unread(step):
-            found.append((before, after, step))
+            waiting.append((before, after, step))
         after = before
-    return reversed(found)
+    return reversed(waiting)
 
 
 def do_again(document: Document, step: Edit, clip: OfClip, progress: Progress | None) -> None:
@@ -111,55 +110,55 @@ def readers(step: Edit, grade: Grade) -> list[Pick]:
     return [pick for pick in picks if gone or pick.id in ids]
 
 
-def found_in(clip: Grade, unread: Grade) -> Found:
+def readings_of(clip: Grade, unread: Grade) -> Readings:
     """Return the picks that an edit with the clip made different from those without it."""
-    both = ((unread.state.get(key), value) for key, value in clip.of_kind("pick").items())
-    return tuple((old, new) for old, new in both if old is not None and old != new)
+    pairs = ((unread.state.get(key), value) for key, value in clip.of_kind("pick").items())
+    return tuple((old, new) for old, new in pairs if old is not None and old != new)
 
 
 def completed(
     grade: Grade,
     history: History,
     steps: tuple[Edit, Edit],
-    found: Found,
+    readings: Readings,
     mattes: Mapping[str, str],
 ) -> tuple[Grade, History]:
-    """Return a grade and its steps where a step has what was found in the clip.
+    """Return a grade and its steps where a step has what the clip says.
 
     `steps` are the step that was made at once, and that of the same edit with the clip. The first
-    may be done or undone; without it in the history, what is found becomes a step of its own.
+    may be done or undone; without it in the history, the readings become a step of their own.
     `mattes` are the texts of the learned mattes by id.
     """
     grade, (step, like) = grade.with_mattes(mattes), steps
     line, done = [*history.done, *reversed(history.undone)], len(history.done)
-    at = max((k for k, each in enumerate(line) if _same(each, step)), default=None)
-    is_done = at is None or at < done
-    now = (with_found if is_done else _versions)(grade.state, found)
-    if at is None:
+    index = max((k for k, each in enumerate(line) if _same(each, step)), default=None)
+    is_done = index is None or index < done
+    now = (with_readings if is_done else _versions)(grade.state, readings)
+    if index is None:
         return grade.with_state(now), history.with_step(
             edits.difference(grade.state, now, like.label).undoable()
         )
     before: State = grade.state
-    for each in reversed(line[at:done]):
+    for each in reversed(line[index:done]):
         before = each.inverse().apply(before)
-    for each in line[done:at]:
+    for each in line[done:index]:
         before = each.apply(before)
-    state, orders = before, [like, *line[at + 1 :]]
-    for k, order in enumerate(orders, at):
+    state, orders = before, [like, *line[index + 1 :]]
+    for k, order in enumerate(orders, index):
         before = line[k].apply(before)
-        after = with_found(before, found)
+        after = with_readings(before, readings)
         line[k] = replace(line[k], changes=_changes(state, after, order))
         state = after
-    line[at] = replace(line[at], label=like.label)
+    line[index] = replace(line[index], label=like.label)
     kept = [each for each in line[:done] if each.changes]
     undone = [each for each in line[done:] if each.changes]
     return grade.with_state(now, grade.label), History(tuple(kept), tuple(reversed(undone)))
 
 
-def with_found(state: State, found: Found) -> dict[Key, Any]:
-    """Return a state whose picks have what was found for them, where nothing else changed it."""
-    result = _versions(state, found)
-    for old, new in found:
+def with_readings(state: State, readings: Readings) -> dict[Key, Any]:
+    """Return a state whose picks have their readings, where nothing else changed them."""
+    result = _versions(state, readings)
+    for old, new in readings:
         own = result.get(("pick", old.id))
         if own is None:
             continue
@@ -174,10 +173,9 @@ def with_found(state: State, found: Found) -> dict[Key, Any]:
     return result
 
 
-def _same(one: Edit, other: Edit) -> bool:
+def _same(step: Edit, other: Edit) -> bool:
     """Return whether two steps change the same, in any order."""
-    first, second = ({change.key: change for change in each.changes} for each in (one, other))
-    return first == second
+    return {c.key: c for c in step.changes} == {c.key: c for c in other.changes}
 
 
 def _changes(before: State, after: State, order: Edit) -> tuple[Change, ...]:
@@ -187,13 +185,13 @@ def _changes(before: State, after: State, order: Edit) -> tuple[Change, ...]:
     return tuple(sorted(new, key=lambda change: places.get(change.key, len(places))))
 
 
-def _versions(state: State, found: Found) -> dict[Key, Any]:
-    """Return a state whose versions have what was found, where they hold the very same picks."""
+def _versions(state: State, readings: Readings) -> dict[Key, Any]:
+    """Return a state whose versions have the readings, where they hold the very same picks."""
     result = dict(state)
     for (kind, name), value in state.items():
         if kind == "version":
             new = {
-                ("pick", old.id): new for old, new in found if value.get(("pick", old.id)) == old
+                ("pick", old.id): new for old, new in readings if value.get(("pick", old.id)) == old
             }
             if new:
                 result["version", name] = {**value, **new}

@@ -29,8 +29,8 @@ Brush = tuple[list[tuple[float, float]], float]
 ReadFrame = Callable[[int], F32]
 """The straight colours of a frame, (h, w, 3) in the palette's code values; NaN: no colour."""
 
-#: A matte is also learned from this many frames along the pick's path, so that colours which come
-#: later are known. More cost a read of a frame each, and change little.
+#: Number of further frames along the pick's path that a matte is learned from, for colours which
+#: come later. More cost a read of a frame each, and change little.
 FURTHER_FRAMES = 3
 #: Samples of a display curve: straight lines between them are within 1/255 of it.
 SAMPLES = 1024
@@ -42,13 +42,13 @@ BRIGHTEST = 2.0
 class Learned:
     """A learned matte: its id, and its text in the sidecar.
 
-    `found` says whether the frame has pixels of the colour; `share` is the share of its pixels that
+    `seen` says whether the frame has pixels of the colour; `share` is the share of its pixels that
     are connected with what was clicked on.
     """
 
     id: str
     text: str
-    found: bool
+    seen: bool
     share: float
 
 

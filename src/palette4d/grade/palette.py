@@ -9,7 +9,7 @@ from palette4d import _core
 from palette4d.common.message import Arg
 from palette4d.grade.edits import Colour
 
-#: Edits of a palette colour farther away than this hardly change the given colour.
+#: Distance in code values above which edits of a palette colour hardly change the given colour.
 FAR = 0.25
 
 

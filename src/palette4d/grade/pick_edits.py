@@ -290,7 +290,7 @@ def _with_matte(grade: Grade, clip: ClipOfPicks, pick: Pick) -> Grade:
     learned = clip.learn(pick, holds, grade.display())
     if learned is None:
         return grade.put("pick", pick.id, pick)
-    matte = learned.id if learned.found else None
+    matte = learned.id if learned.seen else None
     known = grade.with_mattes({learned.id: learned.text})
     return known.put("pick", pick.id, replace(pick, matte=matte))
 

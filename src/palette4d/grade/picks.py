@@ -24,11 +24,10 @@ F64 = NDArray[np.float64]
 Kind = Literal["pick", "hold"]
 Toward = Literal["shift", "colour"]
 
-#: More enabled picks and holds than this are refused: each costs time for each pixel.
+#: Most enabled picks and holds: each costs time for each pixel.
 MOST_PICKS = 100
 
-#: Pixels within about this distance of a picked colour are taken for the same thing's: it is the
-#: standard deviation when a colour is followed.
+#: Standard deviation, in code values, of one object's colours when a colour is followed.
 ALIKE = 0.08
 
 #: The largest absolute `Pick.reach`: beyond, a matte takes all or nothing.
@@ -42,15 +41,9 @@ _WHOLE = {"frame", "start", "until", "fade", "fade_out", "pixel", "points", "rad
 
 @dataclass(frozen=True)
 class PathKey:
-    """Where a picked colour is at a frame.
+    """Where a picked colour is at a frame; `given` by the user, or followed.
 
-    Attributes
-    ----------
-    frame, rgb : float and 3 floats
-    given : bool
-        By the user, not found by following it.
-    there : float
-        How much of the change is asked for, 0..1: 0 where the colour is no longer in the picture.
+    `there` is the share of the change that is asked for: 0 where the colour is out of the picture.
     """
 
     frame: float
@@ -61,16 +54,10 @@ class PathKey:
 
 @dataclass(frozen=True)
 class Area:
-    """A part of the picked object: a box, or a stroke of a brush.
+    """A part of the picked object that was drawn on a frame: a box, or a stroke of a brush.
 
-    Attributes
-    ----------
-    frame : float
-        The frame that it was drawn on.
-    points : tuple of (x, y)
-        Pixels, x from the left, y from the top: one for a box, more for a stroke.
-    radius : float
-        Half of the box's side, or of the brush's width, in pixels.
+    `points` are pixels, x from the left, y from the top: one for a box, more for a stroke. `radius`
+    is half of the box's side, or of the brush's width, in pixels.
     """
 
     frame: float
@@ -191,10 +178,9 @@ class Pick:
         return np.minimum(0.0, ends.min(axis=0)), high
 
     def followed(self) -> tuple[F64, F64]:
-        """Return frames of a path, and how far its colour there is from the picked one.
+        """Return frames of a path, and the distances of its colours there from the picked colour.
 
-        They are whole frames, some hundreds at most, within the pick's range and where the colour
-        is there.
+        At most 1000 whole frames, within the pick's range and where the colour is there.
         """
         frames, _, there = self._keys
         low = frames[0] if self.start is None else max(frames[0], self.start)

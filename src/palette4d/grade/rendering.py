@@ -37,7 +37,7 @@ from palette4d.media.reading import like_source
 from palette4d.media.timecode import timecode_in
 
 Compare = Literal["wipe", "side"]
-#: Pixels above which frames are not read while others are written, between 5K and 6K: of 8K each
+#: Pixels, between 5K and 6K, above which no frame is read while another is written: a frame of 8K
 #: needs 400 MB.
 LARGE = 16_000_000
 Missing = Literal["hold", "black", "error"]
@@ -212,8 +212,8 @@ class Painter:
         for other in self.clip.nearest_to(frame):
             if self._last is not None and self._last[0].frame == other:
                 return self._last
-            if (found := self._painted(other)) is not None:
-                return found
+            if (painted := self._painted(other)) is not None:
+                return painted
         raise self.clip.none_readable()
 
 
@@ -473,7 +473,7 @@ def frame_files(clip: Clip, pattern: FramePattern, samples: str) -> Generator[_W
             metadata = (*metadata, *of_movie(clip, image.frame))
         else:
             kept = {name for name, _, _ in metadata}
-            metadata += tuple(one for one in of_colours(clip) if one[0] not in kept)
+            metadata += tuple(tag for tag in of_colours(clip) if tag[0] not in kept)
         path = pattern.path(image.frame)
         if image.around is not None and isinstance(clip, ImageClip) and clip.whole:
             held = image.around.file != clip.file(image.frame)

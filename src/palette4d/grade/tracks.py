@@ -147,7 +147,7 @@ class Track:
         changes, its first and last colour, and the most colourful of the others: "yellow > lime >
         orange, 0-49". From blue to pale blue is no change, but to dark blue it is. The frames are
         those at which the colour is the track's own, not at other tracks' vertices.
-    at : float
+    frame : float
         The frame of its most colourful vertex; of a fork, the middle.
     first, last : float
         The first and the last frame, with forks.
@@ -157,7 +157,7 @@ class Track:
 
     name: str
     called: str
-    at: float
+    frame: float
     first: float
     last: float
     vertices: tuple[str, ...]
@@ -191,7 +191,7 @@ def tracks_of(handles: Handles, colours: Mapping[str, str]) -> list[Track]:
         if len({labels[v] for v in way}) > 1:
             runs = itertools.groupby(way, key=lambda v: labels[v])
             colour = " > ".join(names[next(run)] for _, run in runs)
-        at = frames[strongest] if chain.vertices else (chain.first + chain.last) / 2
+        frame = frames[strongest] if chain.vertices else (chain.first + chain.last) / 2
         ends = [chain.first, chain.last]
         if chain.vertices:  # at another track's vertex the colour is that track's
             ends[0] = min(frames[chain.vertices[0]], math.floor(chain.first) + 1)
@@ -204,7 +204,7 @@ def tracks_of(handles: Handles, colours: Mapping[str, str]) -> list[Track]:
         vertices = tuple(ids[vertex] for vertex in chain.vertices)
         edges = tuple(edge_ids[edge] for edge in chain.edges)
         name = (vertices or edges)[0]
-        tracks.append(Track(name, called, at, chain.first, chain.last, vertices, edges))
+        tracks.append(Track(name, called, frame, chain.first, chain.last, vertices, edges))
     return tracks
 
 

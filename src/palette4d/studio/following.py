@@ -54,10 +54,10 @@ class Job:
     after: Grade
     step: Edit
 
-    def with_found(self, found: later.Found, done: Grade) -> "Job":
+    def with_readings(self, readings: later.Readings, done: Grade) -> "Job":
         """Return the job after an earlier one has completed picks that this one knows too."""
         before, after = (
-            grade.with_state(later.with_found(grade.state, found)).with_mattes(done.mattes)
+            grade.with_state(later.with_readings(grade.state, readings)).with_mattes(done.mattes)
             for grade in (self.before, self.after)
         )
         step = edits.difference(before.state, after.state, self.step.label).undoable()
@@ -123,11 +123,11 @@ class Follower:
     def _done(self, job: Job, done: Document) -> None:
         if not self._is_first(job):
             return
-        found = later.found_in(done.grade, job.after)
+        readings = later.readings_of(done.grade, job.after)
         self._jobs.popleft()
-        self._jobs = deque(each.with_found(found, done.grade) for each in self._jobs)
+        self._jobs = deque(each.with_readings(readings, done.grade) for each in self._jobs)
         like = done.history.done[-1] if done.history.done else later.as_read(job.step)
-        self._session.complete((job.step, like), found, done.grade.mattes)
+        self._session.complete((job.step, like), readings, done.grade.mattes)
         self._session.say(job.text)
         self._next()
 

@@ -24,7 +24,7 @@ from palette4d.grade import edits, later
 from palette4d.grade.document import Document, OfClip
 from palette4d.grade.edits import Edit as Step
 from palette4d.grade.follow import Progress
-from palette4d.grade.later import Found, Unread
+from palette4d.grade.later import Readings, Unread
 from palette4d.media.clip import Clip, open_clip
 from palette4d.media.source_clip import find_clip
 from palette4d.studio import texts
@@ -291,12 +291,14 @@ class Session(Drafts):
             text = texts.FOLLOWED.format(step=later.as_read(step).label)
             self._follower.add(Job(None, clip.source, text, before, after, step))
 
-    def complete(self, steps: tuple[Step, Step], found: Found, mattes: Mapping[str, str]) -> None:
+    def complete(
+        self, steps: tuple[Step, Step], readings: Readings, mattes: Mapping[str, str]
+    ) -> None:
         """Put what was found in the clip into a step, and go on with what is being dragged."""
         document, dragged = self._document, self._dragged
         assert document is not None
         document.grade, document.history = later.completed(
-            document.grade, document.history, steps, found, mattes
+            document.grade, document.history, steps, readings, mattes
         )
         self._note_edit()
         if dragged is None:
