@@ -8,6 +8,7 @@
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "model/alpha.hpp"
 #include "model/vec3.hpp"
@@ -121,6 +122,20 @@ void check_planes(const Rows<Sample> (&planes)[3], const LumaChroma& how) {
         how.bits > most)
         throw std::invalid_argument("luma and chroma need weights of red and blue and 8 to " +
                                     std::to_string(most) + " bits");
+}
+
+/// The bins of a sample, with the colour of each chosen cell.
+template <class Colour>
+ColourBins sampled(const ColourCells& cells, const std::vector<Vec3>& places, std::size_t most,
+                   Colour colour) {
+    ColourSample sample = sample_colours(cells, places, most);
+    ColourBins out;
+    for (const std::size_t i : sample.chosen) {
+        out.keys.push_back(cells.keys[i]);
+        out.rgb.push_back(colour(i));
+    }
+    out.counts = std::move(sample.counts);
+    return out;
 }
 
 }  // namespace
@@ -399,14 +414,9 @@ ColourBins ColourBinner::sampled_codes(std::size_t most) {
               drained_.keys.push_back(code);
               drained_.counts.push_back(count);
           });
-    const ColourSample sample = sample_colours(drained_, places, most);
-    ColourBins out;
-    for (const std::size_t i : sample.chosen) {
-        out.keys.push_back(drained_.keys[i]);
-        out.rgb.push_back(colour_of(static_cast<std::uint32_t>(drained_.keys[i])));
-    }
-    out.counts = sample.counts;
-    return out;
+    return sampled(drained_, places, most, [&](std::size_t i) {
+        return colour_of(static_cast<std::uint32_t>(drained_.keys[i]));
+    });
 }
 
 /// Samples means: the table, and the map for colours beyond 0..1, hold their indices plus 1.
@@ -427,14 +437,8 @@ ColourBins ColourBinner::sampled_means(std::size_t most) {
     std::vector<Vec3> places;
     for (const std::size_t first : colour_blocks(drained_))
         if (first < codes_.size()) places.push_back(means_[codes_[first]].colour());
-    const ColourSample sample = sample_colours(drained_, places, most);
-    ColourBins out;
-    for (const std::size_t i : sample.chosen) {
-        out.keys.push_back(drained_.keys[i]);
-        out.rgb.push_back(means_[codes_[i]].colour());
-    }
-    out.counts = sample.counts;
-    return out;
+    return sampled(drained_, places, most,
+                   [&](std::size_t i) { return means_[codes_[i]].colour(); });
 }
 
 ColourBins ColourBinner::take(std::size_t most) {
@@ -458,14 +462,7 @@ ColourBins thin(ColourBins bins, std::size_t most) {
         for (std::size_t i = blocks[b]; i < blocks[b + 1]; ++i) mean = mean + 1 / n * bins.rgb[i];
         places.push_back(mean);
     }
-    const ColourSample sample = sample_colours(cells, places, most);
-    ColourBins out;
-    for (const std::size_t i : sample.chosen) {
-        out.keys.push_back(cells.keys[i]);
-        out.rgb.push_back(bins.rgb[i]);
-    }
-    out.counts = sample.counts;
-    return out;
+    return sampled(cells, places, most, [&](std::size_t i) { return bins.rgb[i]; });
 }
 
 }  // namespace palette4d

@@ -198,7 +198,7 @@ def _recoloured(grade: Grade, colours: F64, frame: float) -> F64:
 
 
 def _grade(match: Match, source: Grade) -> Callable[[F64, float], F64]:
-    """Return what the source's grade makes of (n, 3) colours of the target at a target's time."""
+    """Return the function of (n, 3) colours and a time of the target by the source's grade."""
     configs = tuple(_configs(match.target, match.source))
     there = between(match.target.encoding, match.source.encoding, configs)
     back = between(match.source.encoding, match.target.encoding, configs)
@@ -208,7 +208,7 @@ def _grade(match: Match, source: Grade) -> Callable[[F64, float], F64]:
         after = _recoloured(source, before, match.there(frame))
         moved = np.abs(after - before.astype(np.float32)).max(axis=1) > LEAST
         if back is not None:
-            # The difference, so that rounding of the conversions is no edit.
+            # Adds the difference: rounding of the conversions must not count as an edit.
             after = colours + back(after) - back(before)
         result: F64 = np.where(moved[:, None], after, colours)
         return result
@@ -265,7 +265,7 @@ def _pick(match: Match, pick: Pick, into: Callable[[F64], F64] | None) -> Pick |
         nearest = first + step * round((match.back(frame) - first) / step)
         return min(max(nearest, first), last)
 
-    # What is of the other clip is left out.
+    # Places, paths and mattes are the other clip's.
     copy = replace(pick, pixel=None, box=None, areas=(), path=(), matte=None)
     copy = replace(copy, start=None, until=None, fade=0.0, fade_out=None)
     if pick.to is not None:

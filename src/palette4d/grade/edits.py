@@ -112,7 +112,7 @@ class Change:
         return self.kind, self.id
 
     def renamed(self, names: Mapping[Key, str]) -> "Change":
-        """Return the same change with a new id; picks hold their id."""
+        """Return the change with the new id of its key, which a pick has too."""
         id_ = names.get(self.key, self.id)
         values = [self.before, self.after]
         if self.kind == "pick":
@@ -138,7 +138,7 @@ class Edit:
         for change in self.changes:
             if result.get(change.key) != change.before:
                 if change.kind == "version":
-                    continue  # its name holds other edits now, which stay
+                    continue  # the name has other edits now, which stay
                 what = _named(change.key)
                 raise Palette4dError(
                     f"{what} was changed meanwhile, so that the step "
@@ -235,7 +235,7 @@ def _conflict(where: str) -> Palette4dError:
 
 
 def new_id(letter: str, taken: Iterable[str]) -> str:
-    """Return s1, s2, …: one more than the largest in use; removed ids are not reused at once.
+    """Return s1, s2, …: a number above the largest in use, so that removed ids are not reused.
 
     >>> new_id("s", {"s1", "s7", "v9"})
     's8'

@@ -107,7 +107,7 @@ class Grade:
         return replace(self, label=label)
 
     def with_mattes(self, texts: Mapping[str, str]) -> Self:
-        """Return the grade, which knows these mattes too."""
+        """Return the grade with further mattes, texts by id."""
         return replace(self, mattes={**texts, **self.mattes})
 
     # ------------------------------------------------------------------------------- what it holds
@@ -219,7 +219,7 @@ class Grade:
         return state
 
     def note(self, name: str) -> str:
-        """Return what the user says about a version; "" if nothing."""
+        """Return the note of a version; "" without one."""
         return str(self.state.get(("note", name), ""))
 
     @property

@@ -1,4 +1,4 @@
-"""Few keys for many: the keys without which linear interpolation would differ."""
+"""Simplifies keys: keeps those that linear interpolation needs within a tolerance."""
 
 from collections.abc import Iterable, Sequence
 

@@ -207,7 +207,7 @@ class Pick:
         if self.toward == "colour":
             return new - colour
         change: F64 = new - old
-        # The change that makes a wall blue by day would make its night black a bright blue.
+        # In proportion to the light: else a wall that is blue by day were bright blue by night.
         now, picked = float(colour.max()), float(old.max())
         light = max(0.0, now) / max(picked, 1e-9) if now < picked else 1.0
         low, high = self._limits
@@ -222,7 +222,7 @@ class Pick:
         return start <= frame <= until or begin < frame < end
 
     def knots(self, step: float) -> tuple[float, float, float, float]:
-        """Return where the change begins, is full, is full for the last time, and ends.
+        """Return the frames where the ramp before begins and ends, and the ramp after.
 
         Without a fade the ramps take one frame of the clip (`step` frame numbers).
         """
@@ -243,7 +243,7 @@ class Pick:
         return max(0.0, min(before, after)) * self._there(frame)
 
     def _there(self, frame: float) -> float:
-        """Return how much of the colour is in the picture at a frame, 0..1."""
+        """Return the path's `there` at a frame, 0..1."""
         frames, _, there = self._keys
         return float(np.interp(frame, frames, there)) if there.size else 1.0
 

@@ -1,4 +1,4 @@
-"""A new analysis in the place of an old sidecar: what becomes of the user's work in it."""
+"""A new analysis that replaces an old sidecar: edits are kept, moved or copied."""
 
 import itertools
 from pathlib import Path
@@ -81,7 +81,7 @@ def _with_same_handles(old: Grade, new: Grade) -> Grade | None:
 
 
 def _handles(document: Fields) -> tuple[Any, ...]:
-    """Return what edits refer to, and what the moves of a palette keep."""
+    """Return the ids, topology, frames and encoding that edits refer to."""
     polytope, frames = document["polytope"], document["clip"]["frames"]
     vertices = {vertex["id"] for vertex in polytope["vertices"]}
     edges = {(edge["id"], edge["from"], edge["to"]) for edge in polytope["edges"]}
@@ -90,7 +90,7 @@ def _handles(document: Fields) -> tuple[Any, ...]:
 
 
 def _former(target: Path, content: bytes) -> Path:
-    """Return a name beside `target` that is free, or whose file a run that was killed kept."""
+    """Return a free name beside `target`, or that of the same copy by a killed run."""
     stem = target.name.removesuffix(".p4d.json")
     names = itertools.chain(["former"], (f"former{number}" for number in itertools.count(2)))
     paths = (target.with_name(f"{stem}.{name}.p4d.json") for name in names)

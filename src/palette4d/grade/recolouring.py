@@ -56,7 +56,7 @@ def recolour(grade: Grade, image: F32, frame: float, **how: Unpack[Drawing]) -> 
     output = Output(**drawing)
     pixels = _checked_image(image)
     palette = grade.palette(frame)
-    _conversion(grade, space)  # an error for a space that the sidecar lacks
+    _conversion(grade, space)  # checks the space
     recolourer = _core.Recolourer(
         palette.rgb, palette.edited, palette.faces, picks=grade.core.picks_at(palette.frame)
     )

@@ -122,7 +122,7 @@ def mismatches(document: Document, clip: Clip, whole: bool) -> list[str]:
 
 @dataclass
 class Painter:
-    """Draws a clip's frames, and something in the place of a bad frame.
+    """Draws a clip's frames, and pictures for bad frames.
 
     `missing` says what a bad frame shows; "leave out": nothing. `filled` are the bad frames that
     show something, so far.

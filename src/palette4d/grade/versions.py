@@ -1,7 +1,7 @@
 """Versions: edits that the user keeps under a name.
 
-Each function takes a grade and arguments, and returns the grade after the edit, and the name that
-edits which were in the way have now.
+Each function takes a grade and arguments, and returns the grade after the edit. Where edits must
+make room for others, it returns also the name that they are kept under.
 """
 
 import itertools
@@ -24,7 +24,7 @@ def save_version(grade: Grade, name: str) -> tuple[Grade, str | None]:
     if former is not None and former != grade.active:
         kept = free_name(grade, f"former {name}")
         after = after.put("version", kept, former)
-        after = after.having({("note", kept): note_of(grade, name), ("note", name): None})
+        after = after.having({("note", kept): grade.note(name) or None, ("note", name): None})
     return after, kept
 
 
@@ -33,11 +33,6 @@ def _check_name(name: str) -> None:
         raise Palette4dError(
             f"found the version name {name!r}, expected 1 to {LONGEST_NAME} printable characters"
         )
-
-
-def note_of(grade: Grade, name: str) -> str | None:
-    """Return the note of a version, None without one."""
-    return grade.note(name) or None
 
 
 def rename_version(grade: Grade, name: str, new: str) -> Grade:
@@ -49,12 +44,12 @@ def rename_version(grade: Grade, name: str, new: str) -> Grade:
             f"found a version {new!r} already, expected a name that no version has; "
             f"remove or rename that one first"
         )
-    there: Mapping[Key, Any] = {("version", new): edits, ("note", new): note_of(grade, name)}
+    there: Mapping[Key, Any] = {("version", new): edits, ("note", new): grade.note(name) or None}
     return grade.having({**_nothing_of(name), **there}, f"rename version {name} to {new}")
 
 
 def set_note(grade: Grade, name: str, note: str) -> Grade:
-    """Say something about a version; "" takes it away."""
+    """Set the note of a version; "" removes it."""
     grade.of_version(name)
     note = note.strip()
     if len(note) > LONGEST_NOTE or not note.isprintable():
