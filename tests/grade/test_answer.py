@@ -229,3 +229,44 @@ def test_without_the_clip_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr("palette4d.grade.clip_of_picks.find_clip", lambda *_: None)
     document.pick(0, colour=(0.7, 0.1, 0.1), to="#2040b0")
     assert document.answer("p1") is None
+
+
+def test_a_hold_on_what_the_pick_floods_is_no_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The hold's place touches the thing, and is what the hold is for."""
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = RED
+    picture[30:90, 60:120] = np.array([0.7, 0.3, 0.2])
+    document = document_of(monkeypatch, picture)
+    document.pick(0, pixel=(40.0, 60.0), box=9, to="#2040b0", reach=3)
+    before = again(document).share
+    hold = document.hold(0, pixel=(90.0, 60.0), box=9)
+    assert again(document).share < before - 0.1
+    assert not again(document, hold.id).notes
+
+
+def test_a_hold_helps_in_its_own_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What only a later frame has is held there, though the picked frame does not change."""
+    pictures = np.tile(GREY, (2, H, W, 1))
+    pictures[:, 30:90, 20:60] = RED
+    pictures[1, 30:90, 120:160] = RUST
+    noise = np.random.default_rng(0).normal(size=pictures.shape) * 0.01
+    clip: Clip = ArrayClip(np.clip(pictures + noise, 0, 1).astype(np.float32))
+    monkeypatch.setattr("palette4d.grade.clip_of_picks.find_clip", lambda *_: clip)
+    document: Document = palette4d.analyze(
+        np.stack([clip.read(frame)[..., :3] for frame in clip.frames]), vertices=10
+    )
+    document.pick(0, pixel=(40.0, 60.0), box=9, to="#2040b0", reach=3)
+    hold = document.hold(1, pixel=(140.0, 60.0), box=9)
+    assert not again(document, hold.id).notes
+
+
+def test_a_marked_area_is_no_other_thing(monkeypatch: pytest.MonkeyPatch) -> None:
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = RED
+    picture[30:90, 60:100] = np.array([0.7, 0.5, 0.15])
+    document = document_of(monkeypatch, picture)
+    pick = document.pick(0, pixel=(40.0, 60.0), box=9, to="#2040b0")
+    document.add_area(pick.id, Area(0, ((80.0, 60.0),), 4))
+    found = again(document)
+    assert found.share == pytest.approx(0.2, abs=0.02)
+    assert note(found, "another hue") is None

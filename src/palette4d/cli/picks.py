@@ -431,7 +431,8 @@ def _path(pick: Pick) -> list[str]:
             f"  note: at frame {far:g} it is {away.max():.2f} away from the picked colour. If that "
             f"is another thing: pick --frame {far:g} --pixel X,Y --with {pick.id}, or change "
             f"{pick.id} {' '.join(limits)}. If the thing itself changes: change {pick.id} "
-            "--toward colour gives it the same new colour"
+            "--toward colour gives it the same new colour. If it stays: change "
+            f"{pick.id} --no-follow"
         )
     return lines
 

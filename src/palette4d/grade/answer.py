@@ -33,12 +33,12 @@ WIDTH = 480
 #: Least share of the change of a pixel that counts as taken. A marked pixel with less than LEAST is
 #: reported: pale parts of a thing change a little.
 TAKEN, LEAST = 0.25, 0.05
-#: Least shares of the frame to report: of other things that are taken, of a part of the thing that
-#: is not, and of what a hold keeps. Smaller areas are seldom seen.
-OTHERS, PART, KEPT = 0.005, 0.01, 0.001
+#: Least shares of the frame to report: of other things that are taken, and of a part of the thing
+#: that is not. Smaller areas are seldom seen.
+OTHERS, PART = 0.005, 0.01
 #: A proposed box may add at most this many times the part that it is for; more is a flood.
 MULTIPLIES = 1.3
-#: Largest share of the picked thing that a proposed hold may cost, and that is not reported.
+#: Largest share of the picked thing that a hold may cost unreported; a proposed one, half of it.
 COST = 0.1
 #: A pick that takes more than this share of the pixels of another pick is reported.
 SHARED = 0.2
@@ -190,17 +190,25 @@ class _View:
         return np.asarray(view.change(pick) > TAKEN)
 
     def away(self, pick: Pick) -> tuple[F64, F64]:
-        """Return each pixel's distance from the picked colour in pick space, and from its hue."""
+        """Return each pixel's distance in pick space from the nearest marked colour, and hue."""
         display = self.grade.display()
         points = _core.pick_points(self.rgb.reshape(-1, 3), display).reshape(self.rgb.shape)
-        picked = _core.pick_points([pick.rgb], display)[0]
-        off = points - picked
-        chroma = float(np.hypot(picked[0], picked[1]))
-        if chroma < GREY:
-            hue = np.hypot(off[..., 0], off[..., 1])
-        else:
-            hue = np.abs(off[..., 0] * picked[1] - off[..., 1] * picked[0]) / chroma
-        return np.linalg.norm(off, axis=2), hue
+        marked = [self.rgb[self.mark(area) & self.real] for area in pick.areas if self.has(area)]
+        colours = [pick.rgb, *(np.median(rgb, axis=0) for rgb in marked if len(rgb))]
+        distances, hues = [], []
+        for own in _core.pick_points(np.asarray(colours), display):
+            off = points - own
+            chroma = float(np.hypot(own[0], own[1]))
+            distances.append(np.linalg.norm(off, axis=2))
+            if chroma < GREY:
+                hues.append(np.hypot(off[..., 0], off[..., 1]))
+            else:
+                hues.append(np.abs(off[..., 0] * own[1] - off[..., 1] * own[0]) / chroma)
+        return np.min(distances, axis=0), np.min(hues, axis=0)
+
+    def has(self, area: Area) -> bool:
+        """Return whether an area was marked in this frame."""
+        return round(area.frame) == self.frame
 
     def mark(self, area: Area) -> B:
         """Return the pixels of a box or stroke."""
@@ -216,7 +224,7 @@ class _View:
 
     def seeds(self, pick: Pick) -> B:
         """Return the pixels that the user marked in this frame."""
-        marks = [self.mark(area) for area in _marks(pick) if round(area.frame) == self.frame]
+        marks = [self.mark(area) for area in _marks(pick) if self.has(area)]
         return np.asarray(np.any([np.zeros(self.real.shape, bool), *marks], axis=0))
 
     def thing(self, pick: Pick, taken: B) -> B:
@@ -290,26 +298,27 @@ def _unmarked(view: _View, pick: Pick, holds: Sequence[Pick]) -> Iterator[Note]:
 
 def _cost(view: _View, pick: Pick, hold: Pick) -> list[Note] | None:
     """Report what a hold costs a pick's thing; None if the pick takes no less by it."""
-    if round(pick.frame) != view.frame:
-        view = _View.of(view.grade, view.clip, pick.frame)
     without = pick_edits.unpick(view.grade, view.clip, hold.id)
-    before = view.taken(without.pick(pick.id), without)
-    lost = before & ~view.taken(pick)
-    if lost.mean() < KEPT:
+    there = _View.of(view.grade, view.clip, pick.frame)
+    lost, elsewhere = (
+        replace(each, grade=without).change(without.pick(pick.id)) - each.change(pick) > TAKEN
+        for each in (there, view)
+    )
+    if not lost.any() and not elsewhere.any():
         return None
-    held = view.thing(hold, view.taken(hold))  # what is connected with the hold is what it is for
-    thing, seeds = view.thing(pick, before), view.seeds(pick)
-    words = f"{hold.id} lies on what {pick.id} takes, and costs it {{}}"
-    if (held & seeds).sum() <= 0.5 * seeds.sum():
+    thing, seeds = there.thing(pick, there.taken(without.pick(pick.id), without)), there.seeds(pick)
+    words = f"{hold.id} lies on what you picked for {pick.id}, and costs it {{}}"
+    if not seeds.any() or lost[seeds].mean() <= 0.5:
         words = f"{hold.id} also costs {pick.id} {{}} of its own thing"
-        thing = thing & ~_widened(held)
+        held = _widened(there.thing(hold, there.taken(hold)))
+        thing = thing & ((there.away(pick)[0] < there.away(hold)[0]) | ~held)
         lost = _opened(lost & thing)
         if lost.sum() <= COST * thing.sum():
             return []
     words = words.format(percent(float(lost.sum() / max(thing.sum(), 1))))
-    place = view.place(lost)
+    place = there.place(lost)
     note = Note(f"{words}, most of it", place, id=pick.id, warns=True)
-    tried = view.with_area(note, place, pick, lost)
+    tried = there.with_area(note, place, pick, lost)
     if not tried.gesture:
         tried = replace(note, words=f"{words} (remove it, or hold another place), most of it")
     return [tried]
@@ -348,7 +357,7 @@ def _also(view: _View, pick: Pick) -> Iterator[Note]:
             held = view.after(pick, "hold", place)
             if held is not None and held[others].mean() <= 0.5:
                 cost = (~held & spared).sum()
-                note = note.proposing("hold", held) if cost <= COST * spared.sum() else note
+                note = note.proposing("hold", held) if cost <= COST / 2 * spared.sum() else note
             yield note
     part = view.beside(pick, thing, taken)
     least = max(PART, 0.1 * taken.mean())
