@@ -10,10 +10,19 @@
 #include "model/vec3.hpp"
 #include "recolour/recolour.hpp"
 #include "recolour/recolour_plan.hpp"
-#include "simd/split.hpp"
 
 namespace palette4d::gpu {
 namespace {
+
+/// x rounded to T, and the remainder rounded to T.
+template <class T>
+void split(double x, T& high, T& low) {
+    // volatile: when GCC 12 vectorises this, it drops the rounding to float, and the remainder is
+    // 0.
+    const volatile T rounded = static_cast<T>(x);
+    high = rounded;
+    low = static_cast<T>(x - static_cast<double>(high));
+}
 
 /// Colours are pulled in to this, times the palette's largest number above 1.
 constexpr float kReach = 1e4f;

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.cli.main import main
+from palette4d.grade.clip_colours import Share
 from palette4d.grade.document import Document
-from palette4d.grade.shares import Share
 from palette4d.plotting import page, style
 from palette4d.plotting.rows import PlottedPalette, arrange
 

@@ -10,9 +10,9 @@ from palette4d.cli.swatches import row, swatch
 from palette4d.common.text import counted, hex_of, on_lines, percent
 
 if TYPE_CHECKING:
+    from palette4d.grade.clip_colours import Share
     from palette4d.grade.document import Document
     from palette4d.grade.palette import Palette
-    from palette4d.grade.shares import Share
     from palette4d.grade.tracks import Track
 
 EPILOG = """\
@@ -67,8 +67,7 @@ def run(args: argparse.Namespace) -> int:
 
 def info_of(document: "Document") -> dict[str, Any]:
     """Return the output of ``palette4d info --json``; docs/sidecar.md explains the names."""
-    from palette4d.grade.clip_colours import ClipColours
-    from palette4d.grade.shares import track_shares
+    from palette4d.grade.clip_colours import ClipColours, track_shares
 
     fields = document.fields()
     clip, polytope = fields["clip"], fields["polytope"]

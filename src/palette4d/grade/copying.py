@@ -7,6 +7,7 @@ again from the target's clip: there their colour is, connected, or they are not 
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -28,6 +29,7 @@ from palette4d.grade.versions import with_active_kept
 
 F64 = NDArray[np.float64]
 Time = Literal["relative"] | float
+Convert = Callable[[F64], F64]
 
 #: Smaller changes of a handle, in code values, are treated as zero: floats round by as much.
 LEAST = 1e-6
@@ -112,6 +114,14 @@ class Match:
         begin, end, _ = self.source.frames
         return first + (frame - begin) * (last - first) / max(end - begin, 1)
 
+    @cached_property
+    def conversions(self) -> tuple[Convert | None, Convert | None]:
+        """From the target's code values to the source's, and back; None where they are equal."""
+        clips = (grade.members["clip"] for grade in (self.target, self.source))
+        configs = [name for clip in clips if (name := clip.get("conversion", {}).get("config"))]
+        own, other = self.target.encoding, self.source.encoding
+        return between(own, other, configs), between(other, own, configs)
+
     @property
     def pace(self) -> float:
         """Frames of the target for one frame of the source."""
@@ -133,8 +143,7 @@ def copied(
     state = dict(_handles(target, _grade(match, _handles_of(source))))
     kept, _ = with_active_kept(target, "before copy")
     after = kept.with_state({**kept.of_kind("version", "note", "lock"), **state})
-    into = between(source.encoding, target.encoding, _configs(target, source))
-    picks = (_pick(match, pick, into) for pick in source.picks)
+    picks = (_pick(match, pick) for pick in source.picks)
     after, left_out = taken(after, clip, [pick for pick in picks if pick is not None])
     label = f"copy the grade of {source.members['clip']['name']}"
     return after.labelled(label), replace(fit(after, source, time), left_out=tuple(left_out))
@@ -150,7 +159,7 @@ def fit(target: Grade, source: Grade, time: Time = "relative") -> Fit:
     match = _match(target, source, time)
     target, source = _handles_of(target), _handles_of(source)
     graded = _grade(match, source)
-    into = between(target.encoding, source.encoding, _configs(target, source))
+    into, _ = match.conversions
     figures = []
     for frame, colours, weights in _colours(target):
         result = _recoloured(target, colours, frame)
@@ -184,13 +193,6 @@ def _match(target: Grade, source: Grade, time: Time) -> Match:
     return Match(target, source, time)
 
 
-def _configs(*grades: Grade) -> Iterator[str]:
-    for grade in grades:
-        name = grade.members["clip"].get("conversion", {}).get("config")
-        if name:
-            yield name
-
-
 def _recoloured(grade: Grade, colours: F64, frame: float) -> F64:
     image = np.asarray(colours, dtype=np.float32)[None]
     result: F64 = recolouring.recolour(grade, image, frame, space="palette")[0].astype(np.float64)
@@ -199,9 +201,7 @@ def _recoloured(grade: Grade, colours: F64, frame: float) -> F64:
 
 def _grade(match: Match, source: Grade) -> Callable[[F64, float], F64]:
     """Return the function of (n, 3) colours and a time of the target by the source's grade."""
-    configs = tuple(_configs(match.target, match.source))
-    there = between(match.target.encoding, match.source.encoding, configs)
-    back = between(match.source.encoding, match.target.encoding, configs)
+    there, back = match.conversions
 
     def graded(colours: F64, frame: float) -> F64:
         before = colours if there is None else there(colours)
@@ -253,8 +253,9 @@ def _handles(target: Grade, graded: Callable[[F64, float], F64]) -> Iterator[tup
             yield ("handle", id_), Setting(as_colour(new.tolist()), edge["id"], frame)
 
 
-def _pick(match: Match, pick: Pick, into: Callable[[F64], F64] | None) -> Pick | None:
+def _pick(match: Match, pick: Pick) -> Pick | None:
     """Return a pick as it is in the target, or None if it does nothing at the chosen frame."""
+    _, into = match.conversions
 
     def colour(rgb: ArrayLike) -> Colour:
         own = np.array(rgb, float)

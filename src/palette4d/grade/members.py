@@ -203,15 +203,9 @@ def _pick(fields: Mapping[str, Any]) -> Pick:
     return Pick.from_fields(fields)
 
 
-def _true(value: Any) -> bool:
-    if value is not True:
-        raise ValueError(f"found {value!r}, expected true")
-    return True
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise ValueError(f"found {value!r}, expected a text")
+def _typed(value: Any, kind: type) -> Any:
+    if type(value) is not kind or value is False:
+        raise ValueError(f"found {value!r}, expected {'true' if kind is bool else 'a text'}")
     return value
 
 
@@ -220,9 +214,9 @@ _READ: dict[Kind, Callable[[Any], Any]] = {
     "handle": _setting,
     "ramp": as_ramp,
     "pick": _pick,
-    "lock": _true,
+    "lock": lambda value: _typed(value, bool),
     "version": edits_from,
-    "note": _text,
+    "note": lambda value: _typed(value, str),
 }
 
 

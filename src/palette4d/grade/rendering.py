@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
 from fractions import Fraction
@@ -299,6 +299,7 @@ def render(
     width = clip.width * (2 if compare == "side" else 1)
     inputs = {clip.file(frame) for frame in clip.frames}
     todo = clip.frames
+    opened: contextlib.AbstractContextManager[_Write]
     if movie:
         if half or bits is not None:
             raise OutputError(
@@ -341,7 +342,7 @@ def render(
         make_folder(pattern.folder)
         clip, left_out = with_surroundings(clip, pattern, drawn, compare)
         notes = [*repeated, *frame_notes(clip, pattern.extension), *left_out]
-        opened = frame_files(clip, pattern, samples)
+        opened = contextlib.nullcontext(frame_files(clip, pattern, samples))
     warnings = mismatches(document, clip, whole)
     notes = [*clip.notes, *notes]
     if tell is not None:
@@ -463,9 +464,8 @@ def frames_to_render(
 _Write = Callable[[Image, F32], Path]
 
 
-@contextlib.contextmanager
-def frame_files(clip: Clip, pattern: FramePattern, samples: str) -> Generator[_Write]:
-    """Yield a function that writes a frame to its file, with the source frame's metadata."""
+def frame_files(clip: Clip, pattern: FramePattern, samples: str) -> _Write:
+    """Return a function that writes a frame to its file, with the source frame's metadata."""
 
     def write(image: Image, pixels: F32) -> Path:
         metadata = image.metadata
@@ -484,4 +484,4 @@ def frame_files(clip: Clip, pattern: FramePattern, samples: str) -> Generator[_W
         write_frame(path, pixels, samples, premultiplied=premultiplied, metadata=metadata)
         return path
 
-    yield write
+    return write

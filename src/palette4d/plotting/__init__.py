@@ -66,9 +66,8 @@ def plot(
 
     from palette4d.common.errors import Palette4dError
     from palette4d.common.files import refuse_existing, replacing
-    from palette4d.grade.clip_colours import ClipColours
+    from palette4d.grade.clip_colours import ClipColours, track_shares
     from palette4d.grade.document import Document
-    from palette4d.grade.shares import track_shares
     from palette4d.media.source_clip import frame_colours
     from palette4d.plotting import page, style
     from palette4d.plotting.frames import default_frames

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.common.text import counted
-from palette4d.grade.shares import Share
+from palette4d.grade.clip_colours import Share
 from palette4d.plotting import polyhedron, style, timeline
 from palette4d.plotting.rows import PlottedPalette, arrange, track_ids
 from palette4d.plotting.solid import Shape, View, even_sample, extent_of

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from palette4d.common.text import percent
-from palette4d.grade.shares import Share
+from palette4d.grade.clip_colours import Share
 from palette4d.plotting import style
 from palette4d.plotting.layout import (
     BAND,

@@ -199,12 +199,12 @@ def render_frames(task: FramesTask, threads: int) -> Files:
     content = {}
     with tempfile.TemporaryDirectory(prefix="palette4d-") as folder:
         pattern = FramePattern(Path(folder), "", task.pattern.suffix, 1)
-        with rendering.frame_files(clip, pattern, task.samples) as write:
-            for frame in task.frames:
-                if (painted := painter.paint(frame)) is not None:
-                    path = write(*painted)
-                    content[frame] = path.read_bytes()
-                    path.unlink()
+        write = rendering.frame_files(clip, pattern, task.samples)
+        for frame in task.frames:
+            if (painted := painter.paint(frame)) is not None:
+                path = write(*painted)
+                content[frame] = path.read_bytes()
+                path.unlink()
     bad = set(clip.skipped) & set(task.frames)
     return Files(content, tuple(sorted(bad)), tuple(painter.filled))
 

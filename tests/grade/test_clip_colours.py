@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from palette4d.cli.info import info_of
-from palette4d.grade.clip_colours import ClipColours
+from palette4d.grade.clip_colours import ClipColours, track_shares
 from palette4d.grade.document import Document
-from palette4d.grade.shares import track_shares
 
 SPLIT = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_split.p4d.json"
 
