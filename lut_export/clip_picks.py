@@ -30,11 +30,24 @@ class PickConstants:
     tables: F64
     stills: list[int]
     values: list[float]
+    bits: int  #: of a code in the still grids
+
+    @property
+    def table_size(self) -> int:
+        """Bytes without grids and values."""
+        return 4 * (len(self.times) + self.tables.size)
 
     @property
     def size(self) -> int:
         """Bytes."""
-        return 4 * (2 * len(self.times) + self.tables.size + len(self.stills) + len(self.values))
+        return self.table_size + 4 * (len(self.stills) + len(self.values))
+
+    @property
+    def texture(self) -> NDArray[np.uint8]:
+        """(h, 256, 4) bytes: grids, then values, each number as four bytes, the lowest first."""
+        numbers = np.array(self.stills, np.int64).astype("<u4")
+        data = numbers.tobytes() + np.array(self.values, "<f4").tobytes()
+        return np.frombuffer(data + bytes(-len(data) % 1024), np.uint8).reshape(-1, 256, 4)
 
 
 def pick_constants(
@@ -48,7 +61,7 @@ def pick_constants(
     if not mattes:
         return None
     order = sorted(mattes, key=lambda number: mattes[number][0])  # holds last
-    stills, values = _stills([mattes[number][1:] for number in order])
+    stills, values, bits = _stills([mattes[number][1:] for number in order])
     moments = [edits.pick_moments(time) for time in times]
     if not any(moments):
         return None
@@ -61,7 +74,7 @@ def pick_constants(
         table[:, DISPLAY : DISPLAY + 4] = count, len(values), start, scale
         values += samples
     keys = _keys(np.asarray(times), table)
-    return PickConstants([times[key] for key in keys], table[keys], stills, values)
+    return PickConstants([times[key] for key in keys], table[keys], stills, values, bits)
 
 
 Curve = tuple[int, float, float, list[float]]
@@ -158,16 +171,17 @@ def _keys(times: F64, table: F64) -> list[int]:
 
 def _stills(
     mattes: Sequence[tuple[NDArray[np.float32], Sequence[float], Sequence[float]]],
-) -> tuple[list[int], list[float]]:
-    """Return the still grids, and the values, shares and first points that they need."""
+) -> tuple[list[int], list[float], int]:
+    """Return the still grids; the values, shares and first points that they need; bits a code."""
     heads: list[int] = []
     rest: list[int] = []
     values: list[float] = []
-    for grid, shares, point in mattes:
+    books = [np.unique(grid, return_inverse=True) for grid, _, _ in mattes]
+    bits = max(len(levels) - 1 for levels, _ in books).bit_length() or 1
+    for (grid, shares, point), (levels, inverse) in zip(mattes, books, strict=True):
         used = np.flatnonzero(grid.any(axis=(1, 2)))
         first, last = (int(used[0]), int(used[-1])) if len(used) else (0, -1)
-        levels, codes = np.unique(grid, return_inverse=True)
-        codes = codes.reshape(grid.shape)
+        codes = inverse.reshape(grid.shape)
         # The commonest value but 0 is the first: it needs no codes within a line.
         counts = np.bincount(codes.ravel(), weights=(grid.ravel() != 0), minlength=len(levels))
         swapped = np.arange(len(levels))
@@ -177,15 +191,15 @@ def _stills(
         start = 6 * len(mattes) + len(rest)
         heads += [first, last - first + 1, start, start + len(lines), len(values)]
         heads.append(len(values) + len(book))
-        rest += lines + shell
+        rest += lines + _packed(shell, bits)
         values += book.tolist() + list(shares) + list(point)
-    return heads + rest, values
+    return heads + rest, values, bits
 
 
 def _lines(
     codes: NDArray[np.intp], book: NDArray[np.float32], first: int, last: int
-) -> tuple[list[int], list[int]]:
-    """Return each line's runs and where its codes are, and the codes, four a number."""
+) -> tuple[list[int], bytes]:
+    """Return each line's runs and where its codes are, and the codes."""
     runs: list[int] = []
     own: list[bytes] = []
     for u in range(first, last + 1):
@@ -205,13 +219,21 @@ def _lines(
     offsets = [shell.find(one) for one in own]
     lines: list[int] = []
     for i in range(0, len(runs), 2):
-        lines += [runs[i], runs[i + 1], offsets[i] | offsets[i + 1] << 16]
-    shell += bytes(-len(shell) % 4)
-    packed = [
-        shell[i] | shell[i + 1] << 8 | shell[i + 2] << 16 | shell[i + 3] << 24
-        for i in range(0, len(shell), 4)
-    ]
-    return lines, packed
+        # The high bits of where codes are have room in the runs.
+        lines += [
+            run | at >> 16 << 28
+            for run, at in zip(runs[i : i + 2], offsets[i : i + 2], strict=True)
+        ]
+        lines.append(offsets[i] & 65535 | (offsets[i + 1] & 65535) << 16)
+    return lines, bytes(shell)
+
+
+def _packed(codes: bytes, bits: int) -> list[int]:
+    """Return codes of some bits in numbers of 32."""
+    each = 32 // bits
+    padded = np.frombuffer(codes + bytes(-len(codes) % each), np.uint8).astype(np.uint64)
+    places = np.arange(each, dtype=np.uint64) * np.uint64(bits)
+    return [int(number) for number in (padded.reshape(-1, each) << places).sum(axis=1)]
 
 
 def _longest(run: NDArray[np.bool_]) -> tuple[int, int]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.lut_export.clip_conversion import Conversion
-from palette4d.lut_export.clip_picks import pick_constants
+from palette4d.lut_export.clip_picks import PickConstants, pick_constants
 from palette4d.lut_export.frame_edit import check_frame
 
 from palette4d import _core
@@ -18,9 +18,12 @@ from palette4d.common.arguments import parse_frames
 from palette4d.common.errors import Arg, Palette4dError
 
 F64 = NDArray[np.float64]
+Numbers = list[int] | list[float]
 
 #: Bytes of constants: CUDA's constant memory.
 MOST_BYTES = 65536
+#: Values of the picks' mattes, of which the first that has room is taken; 0: as many as they have.
+LEVELS = (0, 32, 16, 8, 4)
 #: Code values by which the interpolated palette may differ at a frame of the clip.
 TOLERANCE = 2e-6
 
@@ -33,7 +36,11 @@ class ClipText:
     ----------
     first, last : the clip's frames that it knows; before and after them the nearest holds.
     keys : times at which the palette is stored.
+    levels : values that the picks' mattes were reduced to; 0: they are exact.
+    error : in the palette's code values, what that changes.
     arrays : constants by name; numbers are all float, or all int.
+    texture : (h, 256, 4) bytes of the picks' mattes, which the dialect's p4d_word(i) reads; None
+        where there are no picks, or where `arrays` have them.
     defines : macros, beside those of the dialect.
     text : the kernel; p4d_at_strength(frame, strength, r, g, b) draws.
     """
@@ -41,14 +48,17 @@ class ClipText:
     first: int
     last: int
     keys: int
-    arrays: dict[str, list[int] | list[float]]
+    levels: int
+    error: float
+    arrays: dict[str, Numbers]
+    texture: NDArray[np.uint8] | None
     defines: str
     text: str
 
     @property
     def size(self) -> int:
         """Bytes of constants."""
-        return 4 * sum(map(len, self.arrays.values()))
+        return _size(self.arrays)
 
 
 @dataclass(frozen=True)
@@ -60,10 +70,13 @@ class _State:
     convex: bool
 
 
-def clip_text(sidecar: _core.Sidecar, frames: str | None, output: object) -> ClipText:
+def clip_text(
+    sidecar: _core.Sidecar, frames: str | None, output: object, *, textures: bool
+) -> ClipText:
     """Return a sidecar's palette, edits, picks and conversion at the frames of a range.
 
-    Palette4dError where they take more than `MOST_BYTES`; `output` is named in it.
+    `textures`: whether the dialect has them. Else mattes are reduced so far that they have room.
+    Palette4dError where all takes more than `MOST_BYTES`; `output` is named in it.
     """
     times = _frames(sidecar, frames)
     states = [_state(sidecar, frame) for frame in times]
@@ -78,50 +91,88 @@ def clip_text(sidecar: _core.Sidecar, frames: str | None, output: object) -> Cli
         "#define P4D_F(i) p4d_faces[i]",
         "#define P4D_K(i) p4d_values[i]",
     ]
-    texts = [_core.kernel_text("clip")]
-    try:
-        picks = pick_constants(sidecar.edits, times, [_recolourer(sidecar, t) for t in times])
-    except ValueError as error:
-        raise Palette4dError(f"{output}: {error}") from error
+    conversion: list[str] = []
+    if sidecar.conversion is not None and not sidecar.conversion.steps.identity:
+        steps = Conversion(sidecar.conversion.steps)
+        defines += ["#define P4D_CONVERTS", "#define P4D_C(i) p4d_curves[i]"]
+        if steps.samples:
+            arrays["p4d_curves"] = steps.samples
+        conversion = [steps.text]
+    if _size(arrays) > MOST_BYTES:
+        raise Palette4dError(
+            f"{output}: found {_size(arrays) / 1024:.0f} KB of palette colours and edits, and "
+            f"there is room for {MOST_BYTES // 1024} KB: export a range of the clip "
+            f"({Arg('frames')}), or parts of it to a file each"
+        )
+    room = MOST_BYTES - _size(arrays)
+    levels, picks = _picks(sidecar, times, room, output, textures=textures)
+    texture, texts = None, [_core.kernel_text("clip")]
     if picks is not None:
-        width = picks.tables.shape[1]
-        arrays |= {
-            "p4d_pick_times": picks.times,
-            "p4d_pick_tables": picks.tables.ravel().tolist(),
-            "p4d_stills": picks.stills,
-            "p4d_books": picks.values,
-        }
+        arrays |= {"p4d_pick_times": picks.times, "p4d_pick_tables": picks.tables.ravel().tolist()}
+        if textures:
+            texture = picks.texture
+            read = "p4d_word(i)", f"intBitsToFloat(p4d_word({len(picks.stills)} + (i)))"
+        else:
+            arrays |= {"p4d_stills": picks.stills, "p4d_books": picks.values}
+            read = "p4d_stills[i]", "p4d_books[i]"
         defines += [
             "#define P4D_TABLE int t_, int n_, float w_,",
             "#define P4D_PASS t_, n_, w_,",
             "#define P4D_T(i) p4d_timed(t_ + (i), n_ + (i), w_)",
-            "#define P4D_G(i) p4d_books[i]",
-            "#define P4D_S(i) p4d_stills[i]",
+            f"#define P4D_S(i) {read[0]}",
+            f"#define P4D_G(i) {read[1]}",
+            f"#define P4D_BITS {picks.bits}",
             f"#define P4D_PICK_KEYS {len(picks.times)}",
             "#define P4D_PICK_TIME(k) p4d_pick_times[k]",
-            f"#define P4D_PICK_FIRST(k) ({width} * (k))",
+            f"#define P4D_PICK_FIRST(k) ({picks.tables.shape[1]} * (k))",
         ]
         texts += [_TIMED, _core.kernel_text("clip_picks")]
-    if sidecar.conversion is not None and not sidecar.conversion.steps.identity:
-        conversion = Conversion(sidecar.conversion.steps)
-        defines += ["#define P4D_CONVERTS", "#define P4D_C(i) p4d_curves[i]"]
-        if conversion.samples:
-            arrays["p4d_curves"] = conversion.samples
-        texts.append(conversion.text)
-    texts.append(_core.kernel_text("clip_main"))
-    text = "\n".join(texts)
-    done = ClipText(int(times[0]), int(times[-1]), len(keys), arrays, "\n".join(defines), text)
-    if done.size > MOST_BYTES:
-        found = f"{done.size / 1024:.0f} KB of palette colours and edits"
-        help_ = f"export a range of the clip ({Arg('frames')}), or parts of it to a file each"
-        if picks is not None:
-            # A range has the same grids: it helps with the rest alone.
-            found += f", {picks.size / 1024:.0f} KB of them for picks and holds"
-            help_ = f"switch picks off, or {help_}"
-        raise Palette4dError(
-            f"{output}: found {found}, and there is room for {MOST_BYTES // 1024} KB: {help_}"
-        )
-    return done
+    text = "\n".join([*texts, *conversion, _core.kernel_text("clip_main")])
+    error = _error(sidecar, levels, picks.times) if picks is not None and levels else 0.0
+    first, last = int(times[0]), int(times[-1])
+    return ClipText(
+        first, last, len(keys), levels, error, arrays, texture, "\n".join(defines), text
+    )
+
+
+def _picks(
+    sidecar: _core.Sidecar, times: Sequence[float], room: int, output: object, *, textures: bool
+) -> tuple[int, PickConstants | None]:
+    """Return the picks with as many values in their mattes as have room, and how many."""
+    found = 0
+    for levels in LEVELS:
+        edits = sidecar.edits.with_matte_levels(levels)
+        try:
+            picks = pick_constants(edits, times, [_recolourer(sidecar, edits, t) for t in times])
+        except ValueError as error:
+            raise Palette4dError(f"{output}: {error}") from error
+        if picks is None:
+            return 0, None
+        found = picks.table_size if textures else picks.size
+        if found <= room:
+            return levels, picks
+    raise Palette4dError(
+        f"{output}: found {found / 1024:.0f} KB of picks and holds, reduced as far as they can be, "
+        f"and there is room for {room / 1024:.0f} KB of {MOST_BYTES // 1024} KB: switch picks off, "
+        f"or export a range of the clip ({Arg('frames')})"
+    )
+
+
+def _error(sidecar: _core.Sidecar, levels: int, times: Sequence[float]) -> float:
+    """Return the largest change of a code value, over a grid of colours, by reduced mattes."""
+    axis = np.linspace(0, 1, 49, dtype=np.float32)
+    grid = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(1, -1, 3)
+    edits = sidecar.edits, sidecar.edits.with_matte_levels(levels)
+    largest = 0.0
+    for frame in times[:: -(-len(times) // 9)]:
+        exact, reduced = (_recolourer(sidecar, e, frame).apply(grid) for e in edits)
+        largest = max(largest, float(np.abs(exact - reduced).max()))
+    return largest
+
+
+def _size(arrays: dict[str, Numbers]) -> int:
+    """Return the bytes of constants."""
+    return 4 * sum(map(len, arrays.values()))
 
 
 _TIMED = """
@@ -132,11 +183,11 @@ P4D_FN float p4d_timed(int now, int next, float w) {
 """
 
 
-def _recolourer(sidecar: _core.Sidecar, frame: float) -> _core.Recolourer:
-    """Return the edit at a frame."""
+def _recolourer(sidecar: _core.Sidecar, edits: _core.Edits, frame: float) -> _core.Recolourer:
+    """Return edits at a frame."""
     cut = _core.slice_at(sidecar.polytope, frame)
-    edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
-    return _core.Recolourer(cut.rgb, edited, cut.faces, picks=sidecar.picks_at(cut.frame))
+    edited = _core.edited_colours(sidecar.polytope, edits, cut)
+    return _core.Recolourer(cut.rgb, edited, cut.faces, picks=edits.picks_at(cut.frame))
 
 
 def _frames(sidecar: _core.Sidecar, frames: str | None) -> list[float]:
@@ -221,7 +272,7 @@ def keys_of(times: F64, states: Sequence[_State]) -> list[tuple[int, F64]]:
 
 def _arrays(
     times: Sequence[float], states: Sequence[_State], keys: Sequence[tuple[int, F64]]
-) -> dict[str, list[int] | list[float]]:
+) -> dict[str, Numbers]:
     """Return the palette's arrays."""
     faces: list[int] = []
     known: dict[tuple[int, ...], int] = {}

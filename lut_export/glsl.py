@@ -1,61 +1,65 @@
 """Write a whole clip as GLSL: a fragment function, or a user shader for mpv."""
 
 import os
-from pathlib import Path
 
-from palette4d.lut_export.clip_file import ClipExport, arrays_text, write_clip
+from palette4d.lut_export.clip_file import ClipExport, Dialect, write_clip
 from palette4d.lut_export.clip_text import ClipText
 
-from palette4d import _core
-from palette4d.common.errors import Palette4dError
 from palette4d.grade.document import Document
 
-_HEAD = """\
-// {name}, frames {first} to {last}: a palette that changes through time, and its edits.
-// Written by palette4d {version}. GLSL 3.30, or GLSL ES 3.00 with highp.
+_GLSL = Dialect(
+    function="",
+    structure="struct name { body };",
+    cast="{}(x)",
+    names="sqrt atan abs min max log2 exp2 pow",
+    array="const {kind} {name}[{count}] = {kind}[{count}](\n    {values});",
+    textures=True,
+)
+#: A texel is a number of 32 bits.
+_WORD = """\
+int p4d_word(int i) {
+    ivec4 n = ivec4(texelFetch(p4d_mattes, ivec2(i & 255, i >> 8), 0) * 255.0 + 0.5);
+    return n.r | n.g << 8 | n.b << 16 | n.a << 24;
+}
 """
 _FUNCTION = """\
-// vec4 palette4d(vec4 colour) draws straight colours; alpha stays.
+// GLSL 3.30, or GLSL ES 3.00 with highp. vec4 palette4d(vec4 colour) draws straight colours; alpha
+// stays.
 uniform float p4d_frame;    // the clip's frame
 uniform float p4d_strength; // 0 to 1
-{body}
+{texture}{body}
 vec4 palette4d(vec4 colour) {{
     p4d_rgb c = p4d_at_strength(p4d_frame, p4d_strength, colour.r, colour.g, colour.b);
     return vec4(c.r, c.g, c.b, colour.a);
 }}
 """
+_SAMPLER = """\
+// The file .rgba beside this one: RGBA, 8 bits, {width} x {height}, not filtered, not converted.
+uniform highp sampler2D p4d_mattes;
+"""
 #: mpv counts the frames that it shows; it does not tell the clip's own.
 _HOOK = """\
 // mpv --glsl-shader=FILE CLIP: play from the start, without seeking.
-//!HOOK MAIN
+{texture}//!HOOK MAIN
 //!BIND HOOKED
-//!DESC palette4d: {name}
-#define P4D_FIRST_FRAME {first}.0
-#define P4D_STRENGTH 1.0
+{bind}//!DESC palette4d: {name}
+#define P4D_HOOK_FIRST {first}.0
+#define P4D_HOOK_STRENGTH 1.0
 {body}
 vec4 hook() {{
     vec4 colour = HOOKED_tex(HOOKED_pos);
-    p4d_rgb c = p4d_at_strength(P4D_FIRST_FRAME + float(frame), P4D_STRENGTH, colour.r, colour.g,
-                                colour.b);
+    p4d_rgb c = p4d_at_strength(P4D_HOOK_FIRST + float(frame), P4D_HOOK_STRENGTH,
+                                colour.r, colour.g, colour.b);
     return vec4(c.r, c.g, c.b, colour.a);
 }}
 """
-_BODY = """\
-#define P4D_FN
-#define P4D_STRUCT(name, body) struct name {{ body }};
-#define P4D_INT(x) int(x)
-#define P4D_FLOAT(x) float(x)
-#define P4D_SQRT sqrt
-#define P4D_ATAN2 atan
-#define P4D_ABS abs
-#define P4D_MIN min
-#define P4D_MAX max
-#define P4D_LOG2 log2
-#define P4D_EXP2 exp2
-#define P4D_POW pow
-{defines}
-{arrays}
-{kernel}"""
+_TEXTURE = """\
+//!TEXTURE p4d_mattes
+//!SIZE {width} {height}
+//!FORMAT rgba8
+//!FILTER NEAREST
+{data}
+"""
 
 
 def export_glsl(
@@ -65,44 +69,48 @@ def export_glsl(
     frames: str | None = None,
     force: bool = False,
 ) -> ClipExport:
-    """Write a sidecar's palette, edits, picks and ramps as GLSL.
+    """Write what `export_dctl` does, and as it does, as GLSL.
+
+    Picks are in a texture, so that many have room. For mpv it is in the file.
 
     Parameters
     ----------
-    source : path or Document
-        A sidecar (.p4d.json), or a document.
+    source, frames, force
+        As for `export_dctl`.
     path : path
-        The file to write: NAME.glsl has a fragment function and its uniforms, NAME.hook is a user
-        shader for mpv.
-    frames : str, optional
-        A range of the clip, such as "1001-1100"; by default all of it.
-    force : bool
-        Replace an existing file.
+        The file to write: NAME.glsl has a fragment function and its uniforms, and with picks a
+        texture NAME.rgba beside it; NAME.hook is a user shader for mpv.
 
     Returns
     -------
     ClipExport
-        What was written. The result is within 1e-4 of `render` at every frame.
-
-    Raises
-    ------
-    SidecarError
-        The sidecar is unusable.
-    Palette4dError
-        The clip takes more than `MOST_BYTES`; nothing was written.
+        What was written.
     """
-    output = Path(path)
-    form = {".glsl": _FUNCTION, ".hook": _HOOK}.get(output.suffix.lower())
-    if form is None:
-        raise Palette4dError(
-            f"{output}: found no extension .glsl or .hook; name the file NAME.glsl for a fragment "
-            "function, NAME.hook for a shader of mpv"
-        )
+    forms = {".glsl": _function, ".hook": _hook}
+    return write_clip(source, path, _GLSL, forms, frames=frames, force=force)
 
-    def text_of(clip: ClipText, name: str) -> str:
-        array = "const {kind} {name}[{count}] = {kind}[{count}](\n    {values});"
-        body = _BODY.format(defines=clip.defines, arrays=arrays_text(clip, array), kernel=clip.text)
-        head = _HEAD.format(name=name, first=clip.first, last=clip.last, version=_core.__version__)
-        return head + form.format(name=name, first=clip.first, body=body)
 
-    return write_clip(source, output, text_of, frames=frames, force=force)
+def _function(clip: ClipText, _: str, body: str) -> str:
+    """Return a fragment function."""
+    sampler = _with_texture(_SAMPLER, clip)
+    return _FUNCTION.format(texture=sampler, body=(_WORD if sampler else "") + body)
+
+
+def _hook(clip: ClipText, name: str, body: str) -> str:
+    """Return a user shader."""
+    texture = _with_texture(_TEXTURE, clip)
+    return _HOOK.format(
+        texture=texture,
+        bind="//!BIND p4d_mattes\n" if texture else "",
+        name=name,
+        first=clip.first,
+        body=(_WORD if texture else "") + body,
+    )
+
+
+def _with_texture(text: str, clip: ClipText) -> str:
+    """Return a text about the picks' texture; none without one."""
+    if clip.texture is None:
+        return ""
+    height, width, _ = clip.texture.shape
+    return text.format(width=width, height=height, data=clip.texture.tobytes().hex())

@@ -17,6 +17,8 @@ F32 = NDArray[np.float32]
 _VERTEX = b"""#version 330
 void main() { gl_Position = vec4(gl_VertexID % 2 * 4 - 1, gl_VertexID / 2 * 4 - 1, 0, 1); }
 """
+#: GL_TEXTURE_2D, GL_RGBA, GL_FLOAT, GL_UNSIGNED_BYTE
+_FLAT, _RGBA, _FLOATS, _BYTES = 0x0DE1, 0x1908, 0x1406, 0x1401
 
 
 @functools.cache
@@ -49,10 +51,35 @@ def functions() -> Any:
     return function
 
 
-def run(fragment: str, image: F32, uniforms: dict[str, float]) -> F32:
+def _texture(gl: Any, unit: int, size: tuple[int, ...], data: NDArray[Any] | None) -> c_uint:
+    """Bind a new texture without filters to a unit: RGBA of float32, or of uint8."""
+    texture = c_uint()
+    gl("glActiveTexture", c_uint(0x84C0 + unit))
+    gl("glGenTextures", c_int(1), ctypes.pointer(texture))
+    gl("glBindTexture", c_uint(_FLAT), texture)
+    whole = data is not None and data.dtype == np.uint8
+    gl(
+        "glTexImage2D",
+        c_uint(_FLAT),
+        c_int(0),
+        c_int(0x8058 if whole else 0x8814),  # GL_RGBA8, GL_RGBA32F
+        *map(c_int, size),
+        c_int(0),
+        c_uint(_RGBA),
+        c_uint(_BYTES if whole else _FLOATS),
+        c_void_p(None if data is None else data.ctypes.data),
+    )
+    for setting in (0x2800, 0x2801):
+        gl("glTexParameteri", c_uint(_FLAT), c_uint(setting), c_int(0x2600))  # nearest
+    return texture
+
+
+def run(
+    fragment: str, image: F32, uniforms: dict[str, float], picks: NDArray[np.uint8] | None = None
+) -> F32:
     """Draw a fragment shader that reads `source` and writes `result`; skip without OpenGL.
 
-    `image` is (n, 4) float32, a row of pixels.
+    `image` is (n, 4) float32, a row of pixels; `picks` the (h, w, 4) texture p4d_mattes.
     """
     gl = functions()
     if gl is None:
@@ -83,25 +110,12 @@ def run(fragment: str, image: F32, uniforms: dict[str, float]) -> F32:
         gl("glUniform1f", c_int(place), c_float(value))
     count = len(image)
     pixels = np.ascontiguousarray(image)
-    textures = (c_uint * 2)()
-    gl("glGenTextures", c_int(2), c_void_p(ctypes.addressof(textures)))
-    kind, rgba32f, rgba, floats = c_uint(0x0DE1), c_int(0x8814), c_uint(0x1908), c_uint(0x1406)
-    for texture, data in zip(textures, (None, pixels.ctypes.data), strict=True):
-        gl("glBindTexture", kind, c_uint(texture))
-        gl(
-            "glTexImage2D",
-            kind,
-            c_int(0),
-            rgba32f,
-            c_int(count),
-            c_int(1),
-            c_int(0),
-            rgba,
-            floats,
-            c_void_p(data),
-        )
-        for setting in (0x2800, 0x2801):
-            gl("glTexParameteri", kind, c_uint(setting), c_int(0x2600))  # nearest
+    target = _texture(gl, 0, (count, 1), None)
+    _texture(gl, 0, (count, 1), pixels)
+    if picks is not None:
+        _texture(gl, 1, picks.shape[1::-1], np.ascontiguousarray(picks))
+        place = gl("glGetUniformLocation", c_uint(program), c_char_p(b"p4d_mattes"), result=c_int)
+        gl("glUniform1i", c_int(place), c_int(1))
     frame, array = c_uint(), c_uint()
     gl("glGenFramebuffers", c_int(1), ctypes.pointer(frame))
     gl("glBindFramebuffer", c_uint(0x8D40), frame)
@@ -109,8 +123,8 @@ def run(fragment: str, image: F32, uniforms: dict[str, float]) -> F32:
         "glFramebufferTexture2D",
         c_uint(0x8D40),
         c_uint(0x8CE0),
-        kind,
-        c_uint(textures[0]),
+        c_uint(_FLAT),
+        target,
         c_int(0),
     )
     gl("glGenVertexArrays", c_int(1), ctypes.pointer(array))
@@ -124,8 +138,8 @@ def run(fragment: str, image: F32, uniforms: dict[str, float]) -> F32:
         c_int(0),
         c_int(count),
         c_int(1),
-        rgba,
-        floats,
+        c_uint(_RGBA),
+        c_uint(_FLOATS),
         c_void_p(result.ctypes.data),
     )
     assert gl("glGetError", result=c_uint) == 0

@@ -252,6 +252,14 @@ void bind_sidecar(py::module_& module) {
                 return palette4d::picks_at(self, frame);
             },
             py::arg("frame"), "The picks and holds of a frame.")
+        .def(
+            "with_matte_levels",
+            [](NamedEdits self, int levels) {
+                for (palette4d::Pick& pick : self.picks) pick.levels = levels;
+                return self;
+            },
+            py::arg("levels"),
+            "The same edits, with mattes of that many values where they were picked; 0: all.")
         .def("still_mattes", &still_mattes,
              "By the number of each enabled pick and hold: whether it is a hold, its matte where "
              "it was picked, the shares of its 16 lightnesses, and the picked colour's point.")

@@ -60,6 +60,8 @@ class Edits:
         """Frames of enabled picks: their own, those of paths, and the ends of ranges and fades."""
     def picks_at(self, frame: float) -> FramePicks:
         """The picks and holds that ask for something at a frame."""
+    def with_matte_levels(self, levels: int) -> Edits:
+        """The same edits, with mattes of that many values where they were picked; 0: all."""
     def still_mattes(self) -> dict[int, tuple[bool, F32, list[float], list[float]]]:
         """What the mattes of enabled picks and holds are made from, by their numbers.
 

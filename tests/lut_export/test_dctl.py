@@ -13,7 +13,14 @@ import pytest
 from numpy.typing import NDArray
 from opencl import run
 from palette4d.lut_export import clip_file, clip_text
-from parity.cases import DOCUMENTS, Document, edited, split_merge_document
+from parity.cases import (
+    DOCUMENTS,
+    Document,
+    edited,
+    learned_odds,
+    picked,
+    split_merge_document,
+)
 from parity.kernel import compiler
 from whole_clips import CONVERTED, PROMISE, converted, exact
 
@@ -208,6 +215,36 @@ def test_a_range_of_frames_is_smaller(colours: F32, tmp_path: Path) -> None:
     assert (part.first, part.last) == (12, 18)
     found = Compiled(path).draw(4, colours)
     assert np.abs(found - exact(document, 15, colours)).max() < PROMISE
+
+
+def noisy(seed: int) -> NDArray[np.uint8]:
+    """Log odds as noisy as those that are learned from clips."""
+    odds = learned_odds(seed).astype(int)
+    soft = (odds > 0) & (odds < 126)
+    noise = np.random.default_rng(seed).integers(-40, 41, odds.shape)
+    return np.where(soft, np.clip(odds + noise, 1, 126), odds).astype(np.uint8)
+
+
+@pytest.mark.parametrize(("room", "levels"), [(65536, 32), (52000, 16), (44000, 8)])
+def test_mattes_get_fewer_values_where_they_have_no_room(
+    room: int, levels: int, colours: F32, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(clip_text, "MOST_BYTES", room)
+    base = DOCUMENTS["still-learned"]
+    picks = [{**pick, "softness": 0.9, "reach": 0} for pick in base["edits"]["picks"]]
+    grids = {name: noisy(seed) for seed, name in enumerate("abc")}
+    document = picked(base, picks, grids)
+    path, done = exported(document, tmp_path)
+    assert done.matte_levels == levels
+    assert 0.8 * room < done.constant_bytes <= room
+    assert f"{done.matte_levels} values" in path.read_text(encoding="ascii").split("#", 1)[0]
+    colours = np.abs(colours).clip(0, 1)
+    found = Compiled(path).draw(1, colours)
+    error = np.abs(found - exact(document, done.first, colours)).max()
+    # The error was measured on other colours.
+    assert 0.5 * done.error < error < 1.1 * done.error < 0.3 / levels
+    # One pick has room as it is.
+    assert exported(picked(base, picks[:1], grids), tmp_path)[1].matte_levels == 0
 
 
 def test_what_a_dctl_cannot_hold_is_refused(

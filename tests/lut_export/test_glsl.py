@@ -27,6 +27,7 @@ void main() { result = palette4d(texelFetch(source, ivec2(gl_FragCoord.xy), 0));
 """
 #: What mpv puts before a user shader, and around it.
 MPV = """
+uniform sampler2D p4d_mattes;
 uniform sampler2D source;
 out vec4 result;
 #define HOOKED_pos gl_FragCoord.xy
@@ -41,12 +42,32 @@ def pixels() -> F32:
     return np.random.default_rng(8).uniform(-0.2, 1.2, (600, 4)).astype(np.float32)
 
 
-def exported(document: Document, folder: Path, name: str = "shot.glsl") -> str:
-    """The GLSL of a document."""
-    source, output = folder / "shot.p4d.json", folder / name
+def exported(
+    document: Document, folder: Path, name: str = "shot.glsl"
+) -> tuple[str, NDArray[np.uint8] | None]:
+    """The GLSL of a document, and its texture."""
+    source = folder / "shot.p4d.json"
     source.write_text(json.dumps(document), encoding="utf-8")
-    palette4d.export_glsl(source, output, force=True)
-    return output.read_text(encoding="ascii")
+    done = palette4d.export_glsl(source, folder / name, force=True)
+    texture = None
+    if done.texture is not None:
+        texture = np.fromfile(done.texture, np.uint8).reshape(-1, 256, 4)
+    return Path(done.output).read_text(encoding="ascii"), texture
+
+
+def blocks(hook: str) -> list[tuple[list[str], str]]:
+    """The blocks of a user shader as mpv reads them: settings, and what follows."""
+    found: list[tuple[list[str], str]] = []
+    settings: list[str] = []
+    for line in hook[hook.index("//!") :].splitlines():
+        if line.startswith("//!"):
+            settings.append(line[3:])
+        else:
+            if settings:
+                found.append((settings, ""))
+                settings = []
+            found[-1] = (found[-1][0], found[-1][1] + line + "\n")
+    return found
 
 
 @pytest.mark.parametrize(
@@ -54,31 +75,36 @@ def exported(document: Document, folder: Path, name: str = "shot.glsl") -> str:
     [
         "changes-smooth",
         "flat-edited",
-        # llvmpipe takes half a minute to compile picks.
-        pytest.param("still-learned", marks=pytest.mark.slow),
+        "still-learned",
+        # llvmpipe takes some seconds to compile each.
+        pytest.param("colour-curve", marks=pytest.mark.slow),
         pytest.param("changes-holds", marks=pytest.mark.slow),
     ],
 )
 def test_the_function_draws_what_render_does(name: str, pixels: F32, tmp_path: Path) -> None:
     document = DOCUMENTS[name]
-    shader = "#version 330\n" + exported(document, tmp_path) + MAIN
+    text, picks = exported(document, tmp_path)
+    assert (picks is not None) == ("picks" in document["edits"])
+    shader = "#version 330\n" + text + MAIN
     first, last = (document["polytope"]["blocks"][i][k] for i, k in ((0, "first"), (-1, "last")))
     changed = 0.0
     for frame in sorted({first, (2 * first + last) // 3, last}):
-        found = gl.run(shader, pixels, {"p4d_frame": frame, "p4d_strength": 1.0})
+        found = gl.run(shader, pixels, {"p4d_frame": frame, "p4d_strength": 1.0}, picks)
         expected = exact(document, frame, pixels[:, :3])
         assert np.abs(found[:, :3] - expected).max() < PROMISE
         changed = max(changed, float(np.abs(expected - pixels[:, :3]).max()))
         assert (found[:, 3] == pixels[:, 3]).all()
     assert changed > 0.05
-    assert (gl.run(shader, pixels, {"p4d_frame": first, "p4d_strength": 0.0}) == pixels).all()
+    assert (
+        gl.run(shader, pixels, {"p4d_frame": first, "p4d_strength": 0.0}, picks) == pixels
+    ).all()
 
 
 @pytest.mark.parametrize("name", CONVERTED)
 def test_the_function_converts(name: str, pixels: F32, repo_root: Path, tmp_path: Path) -> None:
     document, steps = converted(name, repo_root)
     pixels[:, :3] = steps.to_clip(pixels[:, :3])
-    shader = "#version 330\n" + exported(document, tmp_path) + MAIN
+    shader = "#version 330\n" + exported(document, tmp_path)[0] + MAIN
     frame = document["polytope"]["blocks"][0]["first"]
     found = gl.run(shader, pixels, {"p4d_frame": frame, "p4d_strength": 1.0})
     expected = steps.to_palette(exact(document, frame, pixels[:, :3]))
@@ -88,8 +114,10 @@ def test_the_function_converts(name: str, pixels: F32, repo_root: Path, tmp_path
 
 def test_the_shader_of_mpv_counts_from_the_first_frame(pixels: F32, tmp_path: Path) -> None:
     document = DOCUMENTS["changes-stops"]
-    text = exported(document, tmp_path, "shot.hook")
-    assert "\n//!HOOK MAIN\n//!BIND HOOKED\n" in text
+    text, _ = exported(document, tmp_path, "shot.hook")
+    assert [settings for settings, _ in blocks(text)] == [
+        ["HOOK MAIN", "BIND HOOKED", "DESC palette4d: case"]
+    ]
     # Nothing but comments is before the first block.
     assert all(line.startswith("//") for line in text[: text.index("//!HOOK")].splitlines())
     first = document["polytope"]["blocks"][0]["first"]
@@ -100,6 +128,24 @@ def test_the_shader_of_mpv_counts_from_the_first_frame(pixels: F32, tmp_path: Pa
         assert np.abs(found[:, :3] - expected).max() < PROMISE
 
 
+def test_the_shader_of_mpv_has_its_texture(pixels: F32, tmp_path: Path) -> None:
+    document = DOCUMENTS["still-learned"]
+    text, beside = exported(document, tmp_path, "shot.hook")
+    assert beside is None
+    (settings, data), (hook, shader) = blocks(text)
+    assert settings[0] == "TEXTURE p4d_mattes"
+    assert settings[2:] == ["FORMAT rgba8", "FILTER NEAREST"]
+    assert hook[:3] == ["HOOK MAIN", "BIND HOOKED", "BIND p4d_mattes"]
+    width, height = map(int, settings[1].removeprefix("SIZE ").split())
+    # mpv wants one line, and neither more nor fewer bytes.
+    picks = np.frombuffer(bytes.fromhex(data.removesuffix("\n")), np.uint8)
+    picks = picks.reshape(height, width, 4)
+    around = f"#version 330\n{MPV}const int frame = 0;\n"
+    found = gl.run(around + shader + MPV_MAIN, pixels, {}, picks)
+    first = document["polytope"]["blocks"][0]["first"]
+    assert np.abs(found[:, :3] - exact(document, first, pixels[:, :3])).max() < PROMISE
+
+
 @pytest.mark.parametrize("version", ["330", "300 es\nprecision highp float;\nprecision highp int;"])
 def test_glslang_has_nothing_to_say(version: str, tmp_path: Path) -> None:
     compiler = shutil.which("glslangValidator")
@@ -107,7 +153,7 @@ def test_glslang_has_nothing_to_say(version: str, tmp_path: Path) -> None:
         lacks("no glslangValidator (Debian: glslang-tools)")
     shader = tmp_path / "shot.frag"
     for name in ("changes-holds", "colour-curve"):
-        shader.write_text(f"#version {version}\n" + exported(DOCUMENTS[name], tmp_path) + MAIN)
+        shader.write_text(f"#version {version}\n" + exported(DOCUMENTS[name], tmp_path)[0] + MAIN)
         done = subprocess.run([compiler, shader], capture_output=True, text=True, timeout=60)
         assert done.returncode == 0, done.stdout
         assert "WARNING" not in done.stdout

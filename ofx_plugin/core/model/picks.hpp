@@ -48,6 +48,7 @@ struct Pick {
     double reach = 0;                     ///< log odds added to the matte
     double softness = 0.5;                ///< 0 a hard matte, 1 a soft one
     double darkest = 0, lightest = 1;     ///< the display lightness that the pick takes
+    int levels = 0;  ///< values of the matte where it was picked, for small exports; 0: all
 
     /// The learned matte, else that of the hue. Throws std::invalid_argument without either.
     const Matte& taken() const;

@@ -36,7 +36,9 @@ FrameMatte still_values(const Pick& pick) {
     for (int i = 0; i <= 2 * Matte::kMiddle; ++i) {
         const double odds = Matte::log_odds(static_cast<std::uint8_t>(i)) + pick.reach;
         const double membership = i == 0 ? 0.0 : 1 / (1 + std::exp(-odds));
-        values[i] = static_cast<float>(smooth_step(membership, low, high));
+        double value = smooth_step(membership, low, high);
+        if (pick.levels > 1) value = std::round(value * (pick.levels - 1)) / (pick.levels - 1);
+        values[i] = static_cast<float>(value);
     }
     FrameMatte still(MatteGrid::kSize);
     const std::vector<std::uint8_t>& odds = pick.taken().odds;

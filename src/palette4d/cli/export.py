@@ -26,7 +26,8 @@ again bakes only files that are missing or changed. Ctrl-C leaves whole files on
 With a manifest each shot's files go to a folder of its name; --otio writes a copy of the edit whose
 clips name the shot's sidecar and files in their metadata ("palette4d").
 --dctl writes palette, edits and picks through time as one file for DaVinci Resolve, without LUTs;
---glsl the same as a fragment function (NAME.glsl) or as a shader for mpv (NAME.hook).
+--glsl the same as a fragment function (NAME.glsl; with picks a texture NAME.rgba beside it) or as a
+shader for mpv (NAME.hook).
 
 examples:
   palette4d export shot010.p4d.json --every 1 -o luts
@@ -171,6 +172,14 @@ def _one_file(args: argparse.Namespace) -> int:
             f"{done.output}: frames {done.first} to {done.last} from {counted(done.keys, 'key')}, "
             f"{done.constant_bytes / 1024:.1f} KB of {MOST_BYTES // 1024} KB"
         )
+        if done.texture is not None:
+            print(f"{done.texture}: the texture for its picks")
+    if done.matte_levels:
+        about = (
+            f"the mattes of picks have {done.matte_levels} values, to have room: code values are "
+            f"off by up to {done.error:.2g}"
+        )
+        tell(args, "note", about)
     return 0
 
 
