@@ -54,25 +54,17 @@ class Document:
     frame numbers; fractions are times between frames. A method that fails raises `Palette4dError`
     and changes nothing.
 
-    Parameters
-    ----------
-    content : mapping or Grade
-        The members of a sidecar (docs/sidecar.md), or a grade.
-    notes : iterable of str
-        Notes of the analysis about the palette.
-    report : mapping, optional
-        Figures of the analysis, as `palette4d analyze --json` prints them.
+    It is made from the members of a sidecar (docs/sidecar.md), or from a grade.
 
     Attributes
     ----------
-    grade : Grade
-        The palette and its edits, as they are now: a value that never changes.
-    history : History
-        The steps that led there.
+    grade, history : Grade and History
+        The palette and its edits as they are now, a value that never changes, and the steps to it.
     notes : tuple of str
-        As above.
+        Notes of the analysis about the palette.
     report : dict
-        As above; empty for a loaded sidecar.
+        Figures of the analysis, as `palette4d analyze --json` prints them; empty for a loaded
+        sidecar.
     """
 
     def __init__(

@@ -176,7 +176,11 @@ def write(
 
     def unchanged() -> None:
         held()
-        if replaces is not None and (not target.exists() or target.read_bytes() != replaces):
+        try:
+            content = None if replaces is None else target.read_bytes()
+        except FileNotFoundError:
+            content = b""
+        if content != replaces:
             raise Palette4dError(
                 f"{target} was changed by another program meanwhile; nothing was written. Try again"
             )
@@ -197,11 +201,15 @@ def existing(target: Path, on_edits: OnEdits) -> Saved | None:
     """Return what a save would replace; None if no edits would be lost."""
     if on_edits not in ("refuse", "keep", "drop"):
         raise ValueError(f"on_edits: found {on_edits!r}, expected 'refuse', 'keep' or 'drop'")
-    if on_edits == "drop" or not target.exists() or target.stat().st_size == 0:
+    if on_edits == "drop":
         return None
     try:
+        if target.stat().st_size == 0:
+            return None
         data = read_bytes(target)
         return (*decoded(data, os.fspath(target)), data)
+    except FileNotFoundError:
+        return None
     except Palette4dError as error:
         raise Palette4dError(
             f"{target} exists and cannot be read as a sidecar ({error}); it may hold edits. "
