@@ -184,6 +184,7 @@ def adjust(
     elif id is not None and id not in grade.handles.edges:
         grade.frame_of(id, None)  # refuses unknown ids
     within = _range(grade, how)
+    when = "" if within is None else colour_moves.range_text(how.get("start"), how.get("until"))
     ramp = how.get("ramp")
     known = None if ramp is None else as_ramp(ramp)
     move, what = _move(grade, id, frame, how)
@@ -191,7 +192,7 @@ def adjust(
     if rgb is not None and within is not None and within.weight(grade.frame_of(id, frame)) < 1:
         raise Palette4dError(
             f"the colour is meant at frame {grade.frame_of(id, frame):g}, outside of the "
-            f"range {_range_text(how)}; expected a range with this frame"
+            f"range {when}; expected a range with this frame"
         )
     own = grade.settings.get(id or "")
     if id is None:
@@ -216,7 +217,7 @@ def adjust(
         locked = {n for kind, n in grade.state if kind == "lock" and n != id}
         changed = {n: setting for n, setting in changed.items() if n not in locked}
     if within is not None:
-        what += f" {_range_text(how)}"
+        what += f" {when}"
     label = f"{'move' if rgb is None else 'set'} {name} {what}"
     values: dict[Key, Setting] = {("handle", n): setting for n, setting in changed.items()}
     moved = tuple(n for n, setting in changed.items() if grade.settings.get(n) != setting)
@@ -227,10 +228,6 @@ def _range(grade: Grade, how: How) -> colour_moves.Range | None:
     """Return the range that the user asked for; None: the whole clip."""
     start, until, fades = how.get("start"), how.get("until"), (how.get("fade"), how.get("fade_out"))
     return colour_moves.range_of(start, until, *fades, frames=grade.frames)
-
-
-def _range_text(how: How) -> str:
-    return colour_moves.range_text(how.get("start"), how.get("until"))
 
 
 def _move(

@@ -61,26 +61,19 @@ def find_chains(
 ) -> tuple[tuple[Chain, ...], NDArray[np.int64], NDArray[np.int64]]:
     """Cut the edges into chains; return them with the chain of each vertex and of each edge."""
     follows, home = _continuations(frames, rgb, edges)
-    edge_chain = np.full(len(edges), -1, dtype=np.int64)
-    members: list[list[int]] = []
     carried_on = set(follows.values())
-    for first in range(len(edges)):
-        if first in carried_on:
-            continue
-        edge: int | None = first
-        chain: list[int] = []
-        while edge is not None:
-            edge_chain[edge] = len(members)
-            chain.append(edge)
-            edge = follows.get(edge)
-        members.append(chain)
-
+    members: list[list[int]] = []
+    for first in (edge for edge in range(len(edges)) if edge not in carried_on):
+        members.append([first])
+        while (edge := follows.get(members[-1][-1])) is not None:
+            members[-1].append(edge)
+    edge_chain = np.full(len(edges), -1, dtype=np.int64)
+    for number, chain in enumerate(members):
+        edge_chain[chain] = number
     vertex_chain = np.full(len(frames), -1, dtype=np.int64)
-    for vertex, edge_at in enumerate(home):
-        if edge_at >= 0:
-            vertex_chain[vertex] = edge_chain[edge_at]
-        else:  # no edge at all: a colour of one frame
-            vertex_chain[vertex] = len(members)
+    for vertex, edge in enumerate(home):
+        vertex_chain[vertex] = edge_chain[edge] if edge >= 0 else len(members)
+        if edge < 0:  # no edge at all: a colour of one frame
             members.append([])
 
     standing_in: list[list[int]] = [[] for _ in members]
