@@ -327,17 +327,22 @@ def _cost(view: _View, pick: Pick, hold: Pick) -> list[Note] | None:
 def _shared(view: _View, pick: Pick, picks: Sequence[Pick]) -> Iterator[Note]:
     """Report earlier picks that take the same pixels, and change them otherwise."""
     taken, ids = view.taken(pick), [each.id for each in view.grade.picks]
+    shares = {}
     for other in picks:
         unlike = np.linalg.norm(pick.change_at(view.frame) - other.change_at(view.frame))
         if ids.index(other.id) > ids.index(pick.id) or unlike < ALIKE:
             continue
         share = float((taken & view.taken(other)).sum() / max(taken.sum(), 1))
         if share > SHARED:
-            yield Note(
-                f"{other.id} takes {percent(share)} of this too; there the changes mix. If this "
-                f"one replaces it, disable or remove {other.id}",
-                warns=True,
-            )
+            shares[other.id] = percent(share)
+    if shares:
+        (first, most), *more = shares.items()
+        also, them = "".join(f", {id_} {part}" for id_, part in more), "them" if more else "it"
+        yield Note(
+            f"{first} takes {most} of this too{also}; there the changes mix. If this one "
+            f"replaces {them}, disable or remove {them}",
+            warns=True,
+        )
 
 
 def _also(view: _View, pick: Pick) -> Iterator[Note]:

@@ -300,7 +300,7 @@ class PickPanel(QWidget):
     def _show_answer(self) -> None:
         found, pick = self.session.answer, self.session.picked
         self._clear()
-        told = [f"{line[0].upper()}{line[1:]}." for line in self._warned]
+        told = [f"{_sentence(line)}." for line in self._warned]
         if found is not None and pick is not None:
             says = texts.TAKES if pick.kind == "pick" else texts.KEEPS
             self.takes.say(says.format(share=percent(found.share), frame=found.frame))
@@ -309,7 +309,7 @@ class PickPanel(QWidget):
                 line.words.setStyleSheet(WARNS if note.warns else "")
                 where = "" if at is None else texts.NOTE_AT.format(x=at.pixel[0], y=at.pixel[1])
                 line.say(
-                    f"{note.words[0].upper()}{note.words[1:]}{where}.",
+                    f"{_sentence(note.words)}{where}.",
                     None if at is None else on_screen(self.session, at.rgb),
                 )
                 line.button.setEnabled(True)
@@ -317,6 +317,11 @@ class PickPanel(QWidget):
                 line.button.setText(texts.ADD_HOLD if note.gesture == "hold" else texts.ADD_BOX)
                 line.button.setToolTip(note.effect)
         self.warning.say("\n".join(told))
+
+
+def _sentence(words: str) -> str:
+    """Return words that begin with a capital, unless with a name such as p1."""
+    return words if words[1:2].isdigit() else f"{words[0].upper()}{words[1:]}"
 
 
 def _add_row(grid: QGridLayout, line: int, tip: str, *parts: QWidget) -> None:

@@ -370,16 +370,17 @@ class TimelinePainter:
         painter.setClipRect(
             QRectF(0, self.places.upper + self.places.head - 6, GUTTER, self.places.height)
         )
+        half = min(7.0, layout.row_height / 2 - 2)
         for edge, y in self.places.edges_at(layout, x):
             if np.isnan(before[edge, 0]).any():
                 continue
             two = seen[edge]
-            box = QRectF(8, y + top - 7, 14, 14)
+            box = QRectF(15 - half, y + top - half, 2 * half, 2 * half)
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(paint.colour_of(two[0]))
             painter.drawRect(box)
             painter.setBrush(paint.colour_of(two[1]))
-            painter.drawRect(QRectF(box.left(), y + top, 14, 7))
+            painter.drawRect(QRectF(box.left(), y + top, 2 * half, half))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.setPen(paint.pen(style.RIM, 1.0))
             painter.drawRect(box)

@@ -28,6 +28,8 @@ LOW_HEAD = 13.0
 #: The heights of a row, and the largest radius of a disc, in rows. Ten of the lowest rows fit below
 #: five picks in a window of 1000x600.
 LOWEST, HIGHEST, RADIUS = 9.0, 46.0, 0.27
+#: Rows of this height leave room for the ranges of many picks.
+ROOMY = 30.0
 #: How many times as high rows can be made on demand.
 TALLEST = 6.0
 #: The fewest frames that fill the width.
@@ -183,7 +185,9 @@ class Places:
     @property
     def lane_height(self) -> int:
         """The height of a pick's range."""
-        return LANE if self._lane_count <= 2 else THIN_LANE
+        count = 0 if self.content is None or self._palette is None else self._palette[2].count
+        left = self.height - RULER - STRIP - HEAD - TAIL - FOOT - self._lane_count * LANE
+        return LANE if self._lane_count <= 2 or left >= count * ROOMY else THIN_LANE
 
     @property
     def head(self) -> float:
