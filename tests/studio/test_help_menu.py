@@ -62,9 +62,9 @@ def test_every_entry_of_the_menus_is_in_the_table(window: Window, repo_root: Pat
 
 def test_the_table_of_the_help_is_searched(window: Window) -> None:
     manual = window.help.manual()
-    assert len(list(manual.items())) > 90
-    manual.search.setText("wipe")
-    seen = [item for item in manual.items() if not item.isHidden()]
+    assert len(list(manual.table.items())) > 90
+    manual.table.search.setText("wipe")
+    seen = [item for item in manual.table.items() if not item.isHidden()]
     assert 0 < len(seen) < 6
     assert all(item.text(0) or k for k, item in enumerate(seen))
     manual.close()

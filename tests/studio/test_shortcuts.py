@@ -9,7 +9,9 @@ from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QKeySequence
 from PySide6.QtTest import QTest
 
-from palette4d.studio.shortcuts import Shortcuts, ShortcutsDialog
+from palette4d.studio.preferences import Preferences
+from palette4d.studio.session import Session
+from palette4d.studio.shortcuts import KeysPage, Shortcuts
 from palette4d.studio.window import Window
 
 Settle = Callable[[Window], None]
@@ -20,11 +22,11 @@ def keys(window: Window, name: str) -> list[str]:
 
 
 def test_a_changed_key_works_and_is_kept(opened: Window, qtbot: Any) -> None:
-    dialog = ShortcutsDialog(opened.keys, opened)
-    dialog.choose("window.show_wipe")
-    dialog.fields[0].setKeySequence(QKeySequence("Ctrl+Shift+Y"))
-    dialog.fields[0].editingFinished.emit()
-    dialog.close()
+    page = KeysPage(opened.keys)
+    page.choose("window.show_wipe")
+    page.fields[0].setKeySequence(QKeySequence("Ctrl+Shift+Y"))
+    page.fields[0].editingFinished.emit()
+    page.close()
     assert keys(opened, "window.show_wipe") == ["Ctrl+Shift+Y", "W"]
     QTest.keyClick(
         opened,
@@ -37,14 +39,14 @@ def test_a_changed_key_works_and_is_kept(opened: Window, qtbot: Any) -> None:
 
 
 def test_a_key_is_taken_from_another_action_after_a_warning(opened: Window) -> None:
-    dialog = ShortcutsDialog(opened.keys, opened)
-    dialog.choose("window.fit")
-    dialog.fields[0].setKeySequence(QKeySequence("M"))
-    assert "Matte" in dialog.told.text()
-    dialog.fields[0].editingFinished.emit()
+    page = KeysPage(opened.keys)
+    page.choose("window.fit")
+    page.fields[0].setKeySequence(QKeySequence("M"))
+    assert "Matte" in page.told.text()
+    page.fields[0].editingFinished.emit()
     assert keys(opened, "window.fit") == ["M"]
     assert keys(opened, "window.matte") == []
-    dialog.reset.click()
+    page.reset.click()
     assert keys(opened, "window.fit") == ["F"]
     assert keys(opened, "window.matte") == ["M"]
     assert opened.settings.value("shortcuts/window.fit") is None
@@ -59,21 +61,21 @@ def test_panels_have_keys_of_their_own(opened: Window) -> None:
 
 
 def test_the_table_is_searched_by_action_and_key(opened: Window) -> None:
-    dialog = ShortcutsDialog(opened.keys, opened)
+    page = KeysPage(opened.keys)
 
     def seen() -> set[str]:
-        return {item.text(1) for item in dialog.items() if not item.isHidden()}
+        return {item.text(1) for item in page.table.items() if not item.isHidden()}
 
     everything = seen()
-    dialog.search.setText("wipe")
+    page.table.search.setText("wipe")
     assert seen() == {"Wipe"}
-    dialog.search.setText("ctrl+s")
+    page.table.search.setText("ctrl+s")
     assert "Save" in seen()
     assert len(seen()) < len(everything)
-    dialog.choose("window.save")
-    assert dialog.fields[0].isEnabled()
-    dialog.search.setText("wipe")
-    assert not dialog.fields[0].isEnabled()  # its row is not seen any more
+    page.choose("window.save")
+    assert page.fields[0].isEnabled()
+    page.table.search.setText("wipe")
+    assert not page.fields[0].isEnabled()  # its row is not seen any more
 
 
 def test_arrows_move_a_cross_that_picks(opened: Window, settle: Settle, qtbot: Any) -> None:
@@ -133,3 +135,26 @@ def test_the_layout_is_reset(opened: Window) -> None:
     assert area == Qt.DockWidgetArea.RightDockWidgetArea
     assert opened.docks["timeline"].isVisible()
     assert not opened.docks["solid"].isHidden()
+
+
+def test_the_display_that_is_preferred_shows_all_clips(opened: Window, qtbot: Any) -> None:
+    opened._do("preferences")
+    dialog = opened.findChild(Preferences)
+    assert dialog is not None
+    chosen = dialog.display
+    assert opened.session.display is not None
+    own = opened.session.display.chosen(opened.session.looked).display
+    other = next(k for k in range(1, chosen.count()) if chosen.itemData(k) != own)
+    chosen.setCurrentIndex(other)
+    chosen.activated.emit(other)
+    name = chosen.itemData(other)
+    assert opened.session.display.chosen(opened.session.looked).display == name
+    again = Window(Session(), opened.settings)
+    qtbot.addWidget(again)
+    assert again.session.view.display == name
+    assert again.session.view.view == ""  # the one that suits the clip
+    assert Preferences(again).display.currentData() == name
+    again.shut()
+    assert opened.files.recent_files()
+    dialog.forget.click()
+    assert opened.files.recent_files() == []

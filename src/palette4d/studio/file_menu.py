@@ -108,6 +108,11 @@ class FileMenu:
         kept = [each for each in self.recent_files() if each != path]
         self.window.settings.setValue("recent", [path, *kept][:RECENT])
 
+    def forget_recent(self) -> None:
+        """Forget the recent files."""
+        self.window.settings.remove("recent")
+        self.window.start.fill()
+
     def recent_files(self) -> list[str]:
         """Return the recent files, the newest first."""
         return self._listed("recent")

@@ -1,22 +1,11 @@
 """The help: first steps, every gesture and key in one table, and what this program is."""
 
-from collections.abc import Iterable
-
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QDialog,
-    QHeaderView,
-    QLineEdit,
-    QMessageBox,
-    QTreeWidget,
-    QTreeWidgetItem,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QDialog, QMessageBox, QVBoxLayout, QWidget
 
 from palette4d.studio import texts
 from palette4d.studio.menu_entries import ACTIONS, PALETTE, SOLID_ACTIONS, TIMELINE_ACTIONS, title
+from palette4d.studio.search_table import SearchTable
 
 
 def rows() -> list[tuple[str, str, str]]:
@@ -47,48 +36,13 @@ class Manual(QDialog):
         self.setWindowTitle(texts.MANUAL)
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.resize(760, 640)
-        self.search = QLineEdit()
-        self.search.setPlaceholderText(texts.SEARCH)
-        self.search.setClearButtonEnabled(True)
-        self.search.textChanged.connect(self._sought)
-        self.table = QTreeWidget()
-        self.table.setColumnCount(3)
-        self.table.setHeaderLabels(texts.MANUAL_COLUMNS)
-        self.table.setRootIsDecorated(False)
-        self.table.setAlternatingRowColors(True)
-        self.table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
-        self.table.setAccessibleName(texts.MANUAL)
-        last = ""
-        for where, what, does in rows():
-            item = QTreeWidgetItem(["" if where == last else where, what, does])
-            item.setData(0, Qt.ItemDataRole.UserRole, where)
-            self.table.addTopLevelItem(item)
-            last = where
-        header = self.table.header()
-        header.setStretchLastSection(True)
-        for column in (0, 1):
-            header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
+        self.table = SearchTable(texts.MANUAL, texts.SEARCH, texts.MANUAL_COLUMNS)
+        for row in rows():
+            self.table.add(*row)
+        self.table.look_for("")
         layout = QVBoxLayout(self)
-        layout.addWidget(self.search)
+        layout.addWidget(self.table.search)
         layout.addWidget(self.table)
-
-    def items(self) -> Iterable[QTreeWidgetItem]:
-        """Return the rows."""
-        for k in range(self.table.topLevelItemCount()):
-            item = self.table.topLevelItem(k)
-            if item is not None:
-                yield item
-
-    def _sought(self, text: str) -> None:
-        """Show the rows with this text; each says where it is."""
-        last = ""
-        for item in self.items():
-            where = str(item.data(0, Qt.ItemDataRole.UserRole))
-            words = " ".join((where, item.text(1), item.text(2))).lower()
-            item.setHidden(text.lower() not in words)
-            if not item.isHidden():
-                item.setText(0, "" if where == last else where)
-                last = where
 
 
 class HelpMenu:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import Qt
 
 from palette4d.studio import grade_steps, texts
-from palette4d.studio.shortcuts import ShortcutsDialog
+from palette4d.studio.preferences import Preferences
 
 if TYPE_CHECKING:
     from palette4d.studio.window import Window
@@ -42,7 +42,7 @@ class MenuActions:
             "reset_all": lambda: grade_steps.reset_all(session),
             "add_stop": lambda: window.timeline.add_stop_at_playhead(),
             "lock": lambda: grade_steps.lock(session),
-            "shortcuts": lambda: ShortcutsDialog(window.keys, window).show(),
+            "preferences": lambda: Preferences(window).show(),
             "cross": viewer.cross.switch,
             "act_from": lambda: self._set_range(start=float(session.frame)),
             "act_until": lambda: self._set_range(until=float(session.frame)),

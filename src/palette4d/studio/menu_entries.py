@@ -70,6 +70,7 @@ ACTIONS = (
     Action("cancel", EDIT, ("Esc",), group=1),
     Action("reset_selected", EDIT, ("Delete", "Backspace"), group=1),
     Action("reset_all", EDIT, (), group=1),
+    Action("preferences", EDIT, ("Ctrl+,",), group=2),
     Action("add_stop", PALETTE, ("S",)),
     Action("lock", PALETTE, ("Ctrl+L",)),
     Action("hold_pixel", PALETTE, ("H",)),
@@ -119,7 +120,6 @@ ACTIONS = (
     Action("loop", PLAYBACK, ("Ctrl+Shift+L",), True, 2),
     Action("first_steps", HELP),
     Action("manual", HELP, ("Ctrl+?",)),
-    Action("shortcuts", HELP),
     Action("about", HELP),
 )
 

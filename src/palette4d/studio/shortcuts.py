@@ -1,20 +1,15 @@
 """Shortcuts that can be searched and changed; the settings keep those that differ from ours."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QSettings, Qt
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QDialog,
     QHBoxLayout,
-    QHeaderView,
     QKeySequenceEdit,
     QLabel,
-    QLineEdit,
     QPushButton,
-    QTreeWidget,
-    QTreeWidgetItem,
     QVBoxLayout,
     QWidget,
 )
@@ -29,13 +24,14 @@ from palette4d.studio.menu_entries import (
     Action,
     title,
 )
+from palette4d.studio.search_table import SearchTable
 
 #: Where the settings keep them.
 GROUP = "shortcuts"
 #: Keys of actions at the same time are at most so many; the first is shown.
 MOST = 2
 #: The action of a row.
-NAME = Qt.ItemDataRole.UserRole
+NAME = Qt.ItemDataRole.UserRole + 1
 
 
 class Shortcuts:
@@ -108,47 +104,31 @@ class Shortcuts:
         entry.setShortcuts([QKeySequence(key) for key in self.keys(name)])
 
 
-class ShortcutsDialog(QDialog):
+class KeysPage(QWidget):
     """A table of the actions, with their keys; the keys of the selected one can be typed."""
 
-    def __init__(self, shortcuts: Shortcuts, parent: QWidget) -> None:
+    def __init__(self, shortcuts: Shortcuts) -> None:
         """Fill the table."""
-        super().__init__(parent)
+        super().__init__()
         self.shortcuts = shortcuts
-        self.setWindowTitle(texts.SHORTCUTS)
-        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.resize(620, 640)
-        self.search = QLineEdit()
-        self.search.setPlaceholderText(texts.SEARCH_KEYS)
-        self.search.setClearButtonEnabled(True)
-        self.search.textChanged.connect(self._sought)
-        self.table = QTreeWidget()
-        self.table.setColumnCount(3)
-        self.table.setHeaderLabels(texts.SHORTCUT_COLUMNS)
-        self.table.setRootIsDecorated(False)
-        self.table.setAlternatingRowColors(True)
+        names = texts.SHORTCUTS, texts.SEARCH_KEYS, texts.SHORTCUT_COLUMNS
+        self.table = SearchTable(*names)
+        self.table.search.textChanged.connect(self._sought)
         self.table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        self.table.setAccessibleName(texts.SHORTCUTS)
-        for column in (0, 1):
-            mode = QHeaderView.ResizeMode.ResizeToContents
-            self.table.header().setSectionResizeMode(column, mode)
         for name, action in shortcuts.actions.items():
             where = {"timeline": texts.IN_TIMELINE, "solid": texts.IN_SOLID}.get(action.view, "")
             text = f"{action.text} {where}".strip()
-            item = QTreeWidgetItem([title(action.menu), text, ""])
-            item.setData(0, NAME, name)
-            self.table.addTopLevelItem(item)
+            self.table.add(title(action.menu), text, "").setData(0, NAME, name)
         self.table.itemSelectionChanged.connect(self._show_chosen)
         self.fields = [QKeySequenceEdit() for _ in range(MOST)]
         self.told = QLabel()
         self.told.setStyleSheet(f"color: {theme.WARNING}")
         self.told.setWordWrap(True)
         layout = QVBoxLayout(self)
-        layout.addWidget(self.search)
+        layout.addWidget(self.table.search)
         layout.addWidget(self.table, 1)
         layout.addLayout(self._make_fields())
         layout.addWidget(self.told)
-        layout.addLayout(self._make_buttons())
         self._show_keys()
         self._show_chosen()
 
@@ -161,26 +141,11 @@ class ShortcutsDialog(QDialog):
             field.keySequenceChanged.connect(self._warn)
             field.editingFinished.connect(self._typed)
             row.addWidget(field, 1)
-        return row
-
-    def _make_buttons(self) -> QHBoxLayout:
-        row = QHBoxLayout()
-        self.reset, close = QPushButton(texts.RESET_KEYS), QPushButton(texts.CLOSE)
+        self.reset = QPushButton(texts.RESET_KEYS)
         self.reset.clicked.connect(self._reset)
-        close.clicked.connect(self.accept)
+        self.reset.setAutoDefault(False)
         row.addWidget(self.reset)
-        row.addStretch(1)
-        row.addWidget(close)
-        for button in (self.reset, close):
-            button.setAutoDefault(False)
         return row
-
-    def items(self) -> Iterator[QTreeWidgetItem]:
-        """Return the rows."""
-        for k in range(self.table.topLevelItemCount()):
-            item = self.table.topLevelItem(k)
-            assert item is not None
-            yield item
 
     @property
     def chosen(self) -> str | None:
@@ -190,24 +155,21 @@ class ShortcutsDialog(QDialog):
 
     def choose(self, name: str) -> None:
         """Select an action."""
-        self.table.setCurrentItem(next(i for i in self.items() if i.data(0, NAME) == name))
+        self.table.setCurrentItem(next(i for i in self.table.items() if i.data(0, NAME) == name))
 
-    def _sought(self, text: str) -> None:
-        for item in self.items():
-            words = " ".join(item.text(column) for column in range(3)).lower()
-            item.setHidden(text.lower() not in words)
+    def _sought(self) -> None:
         if self.chosen is None:  # a hidden row is not selected
             self._show_chosen()
 
     def _show_keys(self) -> None:
-        for item in self.items():
+        for item in self.table.items():
             name = item.data(0, NAME)
             keys = self.shortcuts.keys(name)
             item.setText(2, ", ".join(_native(key) for key in keys))
             font = item.font(2)
             font.setBold(tuple(keys) != self.shortcuts.actions[name].keys)
             item.setFont(2, font)
-        self._sought(self.search.text())
+        self.table.look_for(self.table.search.text())
 
     def _show_chosen(self) -> None:
         keys = [] if self.chosen is None else self.shortcuts.keys(self.chosen)

@@ -137,6 +137,7 @@ ACTIONS = {
         "cancel": "Cancel, select nothing",
         "reset_selected": "Reset the selected handles",
         "reset_all": "Reset everything",
+        "preferences": "Preferences…",
         "add_stop": "Add a stop at the playhead",
         "lock": "Lock or unlock the selected",
         "hold_pixel": "Hold the colour under the pointer",
@@ -187,7 +188,6 @@ ACTIONS = {
         "loop": "Loop",
         "first_steps": "First steps",
         "manual": "Gestures and keys",
-        "shortcuts": "Change the keys…",
         "about": "About palette4d",
     },
     "timeline": {
@@ -430,6 +430,9 @@ MANUAL = "Gestures and keys"
 MANUAL_COLUMNS = ("where", "do this", "and")
 SEARCH = "Search"
 SHORTCUTS = "Keys"
+PREFERENCES, GENERAL = "Preferences", "General"
+DEFAULT_DISPLAY, OWN_DISPLAY = "Display", "the config's default"
+RECENT_FILES, FORGET, LAYOUT = "Recent files", "Forget", "Panels"
 SHORTCUT_COLUMNS = ("menu", "action", "keys")
 SEARCH_KEYS = "Search an action or a key"
 KEYS = "Keys of the selected action"

@@ -51,6 +51,7 @@ from palette4d.studio.instance import Listener
 from palette4d.studio.menu_actions import MenuActions
 from palette4d.studio.menu_entries import ACTIONS, Action
 from palette4d.studio.paths import sequence_of
+from palette4d.studio.preferences import DISPLAY
 from palette4d.studio.scopes_view import Scopes
 from palette4d.studio.session import Session
 from palette4d.studio.shortcuts import Shortcuts
@@ -210,6 +211,7 @@ class Window(QMainWindow):
         self.actions_by_name: dict[str, QAction] = {}
         self._make_menus()
         self.keys = Shortcuts(self.settings, self._entry)
+        session.look(display=str(self.settings.value(DISPLAY) or ""))
         for name in ("first_frame", "previous_frame", "play", "next_frame", "last_frame"):
             button = self.transport.buttons[name]
             button.clicked.connect(functools.partial(self._do, name))
