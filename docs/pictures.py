@@ -94,11 +94,15 @@ class Track:
             (v for v in self.vertices.values() if 20 < v["frame"] < 40),
             key=lambda v: float(np.linalg.norm(np.subtract(v["rgb"], GOLD))),
         )["id"]
-        blocks = document["polytope"]["blocks"]
-        (self.ids,) = (t for b in blocks for t in b["tracks"] if self.gold in t)
-        before = self.ids[self.ids.index(self.gold) - 1]
         edges = document["polytope"]["edges"]
-        (self.edge,) = (e["id"] for e in edges if (e["from"], e["to"]) == (before, self.gold))
+        ways = {e["from"]: e["to"] for e in edges}
+        back = {e["to"]: e["from"] for e in edges}
+        self.edge = next(e["id"] for e in edges if e["to"] == self.gold)
+        self.ids = [self.gold]
+        while self.ids[0] in back:
+            self.ids.insert(0, back[self.ids[0]])
+        while self.ids[-1] in ways:
+            self.ids.append(ways[self.ids[-1]])
 
     def colours(self, frames: NDArray[np.float64], edited: bool) -> NDArray[np.float64]:
         """Return (n, 3): the colour at each frame, before or after the edit."""
@@ -160,13 +164,14 @@ def draw_timeline(demo: Path, folder: Path) -> None:
     axes.plot(when, 2.2 + 3.2 * amount, color="#f2a5c4", lw=2, zorder=3)
     axes.text(low, 2.6, "how far the edit moves\nthis colour", color=DIM, fontsize=10, va="bottom")
 
-    gold, end = track.vertices[track.gold]["frame"], high
+    after = track.ids[track.ids.index(track.gold) + 1]
+    gold, end = (track.vertices[name]["frame"] for name in (track.gold, after))
     note: dict[str, Any] = {"color": TEXT, "fontsize": 12, "ha": "center", "va": "top"}
     line: dict[str, Any] = {"arrowstyle": "-", "color": TEXT, "lw": 1.2}
     for x, place, text in (
         (gold, 29.6, f"vertex {track.gold}\nthe edit sets it: gold becomes rose"),
         (HELD, 16.0, f"stop at frame {HELD}\nholds the colour as it was"),
-        (end, 45.2, f"vertex {track.ids[-1]}, not edited\nthe edit has faded"),
+        (end, 42.2, f"vertex {after}, not edited\nthe edit has faded"),
     ):
         axes.annotate(text, (x, 10.4), (place, 8.6), arrowprops=line, **note)
     for left, right, text in ((HELD, gold, "ramp in"), (gold, end, "ramp out")):

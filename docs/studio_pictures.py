@@ -47,7 +47,10 @@ def draw(
     box: list[tuple[int, int, int, int]] = []
 
     def ready(window: Any) -> None:
+        from PySide6.QtWidgets import QApplication
+
         prepare(window)
+        QApplication.processEvents()  # the panels are where they will be
         if part:
             view = getattr(window, part)
             at = view.mapTo(window, view.rect().topLeft())
@@ -74,7 +77,7 @@ def main() -> None:
         draw("studio", sidecar, 28, whole)
         draw("studio_compare", sidecar, 11, wipe, size=(1400, 860), part="viewer")
         draw("studio_timeline", sidecar, 22, timeline, size=(1500, 1450), part="timeline")
-        draw("studio_solid", sidecar, 28, solid, size=(1500, 1300), part="solid")
+        draw("studio_solid", sidecar, 30, solid, size=(1500, 1300), part="solid")
         draw_picks(Path(folder))
 
 
@@ -104,15 +107,9 @@ def draw_picks(folder: Path) -> None:
     draw("studio_scopes", sidecar, 53, scopes, part="scopes")
 
 
-def rose(window: Any) -> str:
-    """Return the id of the demo's edited vertex, or of its first stop."""
-    edits = window.session.document.fields()["edits"]
-    return str(edits["vertices"][0]["vertex"] if edits["vertices"] else edits["stops"][0]["id"])
-
-
 def whole(window: Any) -> None:
-    """Select the rose of autumn."""
-    window.session.select(rose(window))
+    """Select the stop that the demo edits."""
+    window.session.select("s1")
 
 
 def wipe(window: Any) -> None:
@@ -126,8 +123,11 @@ def timeline(window: Any) -> None:
 
 
 def solid(window: Any) -> None:
-    """Select the rose of autumn, seen from the side."""
-    window.session.select(rose(window))
+    """Make the orange of autumn a rose that turns faces inside out, seen from the side."""
+    palette = window.session.document.grade.palette(window.session.frame)
+    vertex = palette.ends[palette.nearest((1.0, 0.6, 0.1))[0]][0]
+    window.session.edit(lambda document: document.set(vertex, rgb=(0.9, 0.42, 0.62)))
+    window.session.select(vertex)
     window.solid.azimuth, window.solid.elevation = 24.0, 14.0
 
 
@@ -137,8 +137,8 @@ def scopes(window: Any) -> None:
 
     window.session.select("p1")
     window.session.look(compare="wipe")
-    window.docks["inspector"].hide()
-    window.docks["history"].hide()
+    for name in ("inspector", "history", "versions"):
+        window.docks[name].hide()
     window.show_or_hide("scopes")
     window.resizeDocks([window.docks["scopes"]], [840], Qt.Orientation.Horizontal)
     for button in window.scopes.buttons.values():
