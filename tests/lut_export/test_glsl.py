@@ -162,3 +162,15 @@ def test_glslang_has_nothing_to_say(version: str, tmp_path: Path) -> None:
 def test_another_extension_is_refused(tmp_path: Path) -> None:
     with pytest.raises(Palette4dError, match=r"NAME\.glsl.*NAME\.hook"):
         exported(DOCUMENTS["changes-stops"], tmp_path, "shot.frag")
+
+
+def test_a_texture_is_replaced_only_by_force(tmp_path: Path) -> None:
+    source, other = tmp_path / "shot.p4d.json", tmp_path / "shot.rgba"
+    source.write_text(json.dumps(DOCUMENTS["still-pick"]), encoding="utf-8")
+    other.write_bytes(b"the user's")
+    with pytest.raises(Palette4dError, match=r"shot\.rgba"):
+        palette4d.export_glsl(source, tmp_path / "shot.glsl")
+    assert other.read_bytes() == b"the user's"
+    assert not (tmp_path / "shot.glsl").exists()
+    palette4d.export_glsl(source, tmp_path / "shot.glsl", force=True)
+    assert other.stat().st_size % 1024 == 0
