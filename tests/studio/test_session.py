@@ -97,8 +97,8 @@ def test_edits_without_a_pause_are_saved_all_the_same(
 ) -> None:
     id_, clock, written = vertex(sidecar), 0.0, []
     monkeypatch.setattr("palette4d.studio.session.time", SimpleNamespace(monotonic=lambda: clock))
-    for _ in range(40):
-        clock += SAVE_AFTER / 4
+    for _ in range(60):
+        clock += SAVE_AFTER / 2
         before = sidecar.read_bytes()
         session.edit(lambda document, x=clock: document.set(id_, rgb=(x / 10, 0.0, 0.0)))
         session.tick()

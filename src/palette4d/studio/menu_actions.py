@@ -52,16 +52,12 @@ class MenuActions:
             "pick_pixel": lambda: self._at_pointer(viewer.on_pick),
             "hold_pixel": lambda: self._at_pointer(viewer.on_hold),
             "save_version": lambda: grade_steps.keep_version(session),
-            "switch": lambda: session.look(
-                compare="after" if session.view.compare == "before" else "before"
-            ),
+            "switch": self._switch,
             "show_after": lambda: session.look(compare="after"),
             "show_before": lambda: session.look(compare="before"),
             "show_wipe": lambda: session.look(compare="wipe"),
             "show_side": lambda: session.look(compare="side"),
-            "compare": lambda: session.look(  # the key does so while it is down
-                compare="after" if session.view.compare == "before" else "before"
-            ),
+            "compare": self._switch,  # the key does so while it is down
             "fit": viewer.fit,
             "one_to_one": lambda: viewer.zoom_to(1.0, viewer.pointer),
             "zoom_in": lambda: viewer.zoom_by(ZOOM, viewer.pointer),
@@ -108,6 +104,10 @@ class MenuActions:
             self.window.showNormal()
         else:
             self.session.select()
+
+    def _switch(self) -> None:
+        before = self.session.view.compare == "before"
+        self.session.look(compare="after" if before else "before")
 
     def _set_range(self, start: float | None = None, until: float | None = None) -> None:
         pick = self.session.picked

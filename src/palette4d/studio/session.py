@@ -38,7 +38,7 @@ T = TypeVar("T")
 
 #: Seconds between the last edit and its save, and the most while edits go on. More would leave too
 #: little of the two seconds within which an edit is on disk.
-SAVE_AFTER, SAVE_AT_MOST = 0.3, 1.0
+SAVE_AFTER, SAVE_AT_MOST = 0.1, 1.0
 #: Seconds until a save that failed is tried again.
 TRY_AGAIN = 5.0
 

@@ -36,6 +36,16 @@ CLOCK = 4
 LEAST_WIDTH = 380
 #: Seconds between two requests for frames that are late.
 ASK_EVERY = 0.03
+#: The signs of the buttons, 64 pixels wide: triangles from x to their tip's x, bars from x and how
+#: wide they are.
+SIGNS: dict[str, tuple[tuple[tuple[int, int], ...], tuple[tuple[int, int], ...]]] = {
+    "play": (((18, 50),), ()),
+    "stop": ((), ((18, 9), (37, 9))),
+    "next_frame": (((26, 50),), ((16, 6),)),
+    "previous_frame": (((38, 14),), ((42, 6),)),
+    "first_frame": (((36, 18), (54, 36)), ((10, 6),)),
+    "last_frame": (((10, 28), (28, 46)), ((48, 6),)),
+}
 
 
 class Playback(QObject):
@@ -374,31 +384,11 @@ def icon(name: str) -> QIcon:
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(QColor(theme.TEXT))
 
-    def triangle(left: float, right: float) -> None:
+    triangles, bars = SIGNS[name]
+    for left, right in triangles:
         tip = [QPointF(left, 14), QPointF(right, 32), QPointF(left, 50)]
         painter.drawPolygon(QPolygonF(tip))
-
-    def bar(left: float, width: float = 6) -> None:
-        painter.drawRect(QRectF(left, 14, width, 36))
-
-    if name == "play":
-        triangle(18, 50)
-    elif name == "stop":
-        bar(18, 9)
-        bar(37, 9)
-    elif name == "next_frame":
-        bar(16)
-        triangle(26, 50)
-    elif name == "previous_frame":
-        triangle(38, 14)
-        bar(42)
-    elif name == "first_frame":
-        bar(10)
-        triangle(36, 18)
-        triangle(54, 36)
-    elif name == "last_frame":
-        triangle(10, 28)
-        triangle(28, 46)
-        bar(48)
+    for left, wide in bars:
+        painter.drawRect(QRectF(left, 14, wide, 36))
     painter.end()
     return QIcon(pixmap)

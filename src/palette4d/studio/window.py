@@ -66,7 +66,7 @@ from palette4d.studio.versions_gallery import Gallery
 from palette4d.studio.viewer import Viewer
 
 #: Milliseconds between two looks at the file.
-TICK = 200
+TICK = 100
 #: Milliseconds between two looks whether the picture is shown, so that panels can be told; the
 #: longest wait for it, and between two panels.
 LOOK, LONGEST_REST = 5, 120
