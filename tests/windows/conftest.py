@@ -1,4 +1,4 @@
-"""The program on Windows: `make test-windows` names a folder with Wine's in PALETTE4D_WINDOWS.
+"""The folder for Windows: `make test-windows` names where it lies, with Wine, in PALETTE4D_WINDOWS.
 
 Without that variable no test is collected here.
 """
@@ -13,23 +13,23 @@ from pathlib import Path
 
 import pytest
 
-GIVEN = os.environ.get("PALETTE4D_WINDOWS")
+GIVEN = os.environ.get("PALETTE4D_WINDOWS", "")
+FOLDER = Path(GIVEN, "Grüße 色", "palette4d")
 collect_ignore_glob = [] if GIVEN else ["test_*.py"]
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
-def wine(*words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-    """Run Windows' Python; its output goes through a pipe, which Wine cannot do to a file."""
-    folder = Path(GIVEN or "")
+def wine(program: str, *words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """Run a program of the folder; its output goes through a pipe, since Wine writes to no file."""
     environment = {
-        "WINEPREFIX": str(folder / "wine"),
+        "WINEPREFIX": str(Path(GIVEN) / "wine"),
         "WINEDEBUG": "-all",
         "WINEDLLOVERRIDES": "mscoree,mshtml=",
         "LC_ALL": "C.UTF-8",  # file names in UTF-8
     }
     return subprocess.run(
-        ["wine", folder / "python" / "python.exe", *words],
+        ["wine", FOLDER / program, *words],
         cwd=cwd,
         env={**os.environ, **environment},
         stdin=subprocess.DEVNULL,
@@ -42,9 +42,33 @@ def wine(*words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.fixture(scope="session")
-def windows_python() -> Run:
-    """Python on Windows."""
+def folder() -> Path:
+    """The folder as it was unpacked."""
+    return FOLDER
+
+
+@pytest.fixture(scope="session")
+def drive() -> Path:
+    """Drive C of Windows."""
+    return Path(GIVEN, "wine", "drive_c")
+
+
+@pytest.fixture(scope="session")
+def windows_program() -> Run:
+    """A program of the folder."""
     return wine
+
+
+@pytest.fixture(scope="session")
+def windows_pytest() -> Run:
+    """Pytest, with Python of the folder."""
+    tools = f"Z:{Path(GIVEN) / 'tools'}"
+    start = f"import sys; sys.path.append({tools!r}); import pytest; sys.exit(pytest.main())"
+
+    def run(*words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+        return wine("python/python.exe", "-c", start, *words, cwd=cwd)
+
+    return run
 
 
 @pytest.fixture(scope="session")
@@ -52,7 +76,7 @@ def windows() -> Run:
     """A verb on Windows."""
 
     def run(*words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-        return wine("-m", "palette4d", *words, cwd=cwd)
+        return wine("palette4d.exe", *words, cwd=cwd)
 
     return run
 

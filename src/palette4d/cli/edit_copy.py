@@ -65,7 +65,7 @@ def add_actions(action: Action) -> None:
         "--shots",
         metavar="PATTERN",
         default="*",
-        help="of a show only the shots with these names, such as 'sc07_*'",
+        help='of a show only the shots with these names, such as "sc07_*"',
     )
     parser.set_defaults(run=run)
 

@@ -107,7 +107,8 @@ def install_bundle(
                 with contextlib.suppress(WriteError):
                     _write_program(bundle)
             else:
-                shutil.copytree(bundle, fresh)
+                # Bytes alone: modes are set below, and Wine lacks Windows' own copying.
+                shutil.copytree(bundle, fresh, copy_function=shutil.copyfile)
                 _write_program(fresh)
                 _open_for_all(fresh)
             _replace(fresh, target, temporary / "old")
