@@ -34,9 +34,6 @@ struct Read {
     // Of the grid that was read last:
     alignas(64) T inside[kSize];  ///< above 0 where it may change something
     alignas(64) int node[kSize];  ///< where its values around a colour are
-    /// They themselves, already between the two nodes of the first axis. Single precision has the
-    /// four values of a colour side by side, double those of 64 colours.
-    alignas(64) T around[4 * kSize];
 };
 
 /// NaN gives `low`.
@@ -132,77 +129,46 @@ PALETTE4D_INLINE void place(Channels<const T> shown, int at, Read<T>& read) {
     store(read.grey + at, within(sum * all(static_cast<T>(1.0 / 3)), T(0), T(1)));
 }
 
-/// Reads a grid around the colours from `at` on.
-PALETTE4D_INLINE void read_grid(const PickPlan<float>::Grid& grid, int at, Read<float>& read) {
-    typedef float Four __attribute__((vector_size(16)));
-    const float *const values = grid.values, *const next = grid.values + grid.plane;
-    const int* const node = read.node + at;
-    const float* const part = read.part[0] + at;
-    float* const around = read.around + 4 * static_cast<std::ptrdiff_t>(at);
-    for (int lane = 0; lane < Lanes<float>::kCount; ++lane) {
-        Four low, high;
-        std::memcpy(&low, values + static_cast<unsigned>(node[lane]), sizeof low);
-        std::memcpy(&high, next + static_cast<unsigned>(node[lane]), sizeof high);
-        const Four found = low + part[lane] * (high - low);
-        std::memcpy(around + 4 * lane, &found, sizeof found);
-    }
+/// The values of colours `lane`, `lane` + 4, ... between the two nodes of the first axis.
+template <int lane>
+PALETTE4D_INLINE Lanes<float> read_fours(const PickPlan<float>::Grid& grid, const int* node,
+                                         Lanes<float> part) {
+    const Lanes<float> low = load_fours(grid.values, node + lane),
+                       high = load_fours(grid.values + grid.plane, node + lane);
+    return low + shuffled<lane, lane, lane, lane>(part, part) * (high - low);
 }
-PALETTE4D_INLINE void read_grid(const PickPlan<double>::Grid& grid, int at, Read<double>& read) {
+/// The four values around colours, between the two nodes of the first axis: of the lower lightness
+/// the two along the second axis, then those of the higher one.
+PALETTE4D_INLINE void read_grid(const PickPlan<float>::Grid& grid, const int* node,
+                                Lanes<float> part, Lanes<float> (&around)[4]) {
+    const Lanes<float> a = read_fours<0>(grid, node, part), b = read_fours<1>(grid, node, part),
+                       c = read_fours<2>(grid, node, part), d = read_fours<3>(grid, node, part);
+    const Lanes<float> dark_ab = shuffled<0, 1, 0, 1>(a, b), dark_cd = shuffled<0, 1, 0, 1>(c, d),
+                       light_ab = shuffled<2, 3, 2, 3>(a, b), light_cd = shuffled<2, 3, 2, 3>(c, d);
+    around[0] = shuffled<0, 2, 0, 2>(dark_ab, dark_cd);
+    around[1] = shuffled<1, 3, 1, 3>(dark_ab, dark_cd);
+    around[2] = shuffled<0, 2, 0, 2>(light_ab, light_cd);
+    around[3] = shuffled<1, 3, 1, 3>(light_ab, light_cd);
+}
+PALETTE4D_INLINE void read_grid(const PickPlan<double>::Grid& grid, const int* node,
+                                Lanes<double> part, Lanes<double> (&around)[4]) {
     constexpr int kLine = MatteGrid::kLightnesses;
-    for (int i = at; i < at + Lanes<double>::kCount; ++i) {
-        for (int k = 0; k < 4; ++k) {
-            const float* const node = grid.values + read.node[i] + (k >> 1) + (k & 1) * kLine;
-            const double low = static_cast<double>(node[0]),
-                         high = static_cast<double>(node[grid.plane]);
-            read.around[k * kSize + i] = low + read.part[0][i] * (high - low);
+    for (int k = 0; k < 4; ++k) {
+        for (int lane = 0; lane < Lanes<double>::kCount; ++lane) {
+            const float* const from = grid.values + node[lane] + (k >> 1) + (k & 1) * kLine;
+            const double low = static_cast<double>(from[0]),
+                         high = static_cast<double>(from[grid.plane]);
+            around[k].v[lane] = low + part.v[lane] * (high - low);
         }
     }
 }
 
-/// The even and the odd elements of two registers.
-PALETTE4D_INLINE void unzip(Lanes<float> a, Lanes<float> b, Lanes<float>& even, Lanes<float>& odd) {
-#if PALETTE4D_LANES_BYTES == 16
-#define PALETTE4D_EVEN 0, 2, 4, 6
-#define PALETTE4D_ODD 1, 3, 5, 7
-#elif PALETTE4D_LANES_BYTES == 32
-#define PALETTE4D_EVEN 0, 2, 4, 6, 8, 10, 12, 14
-#define PALETTE4D_ODD 1, 3, 5, 7, 9, 11, 13, 15
-#else
-#define PALETTE4D_EVEN 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30
-#define PALETTE4D_ODD 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31
-#endif
-#if defined(__clang__)
-    even.v = __builtin_shufflevector(a.v, b.v, PALETTE4D_EVEN);
-    odd.v = __builtin_shufflevector(a.v, b.v, PALETTE4D_ODD);
-#else
-    even.v = __builtin_shuffle(a.v, b.v, Lanes<float>::Integers{PALETTE4D_EVEN});
-    odd.v = __builtin_shuffle(a.v, b.v, Lanes<float>::Integers{PALETTE4D_ODD});
-#endif
-#undef PALETTE4D_EVEN
-#undef PALETTE4D_ODD
-}
-
-/// The four values of colours from `at` on: of the lower lightness the two along the second axis,
-/// then those of the higher one.
-PALETTE4D_INLINE void load_around(const Read<float>& read, int at, Lanes<float> (&found)[4]) {
-    constexpr int n = Lanes<float>::kCount;
-    Lanes<float> even[2], odd[2];
-    for (int i = 0; i < 2; ++i) {
-        const float* const from = read.around + 4 * at + 2 * i * n;
-        unzip(load(from), load(from + n), even[i], odd[i]);
-    }
-    unzip(even[0], even[1], found[0], found[2]);
-    unzip(odd[0], odd[1], found[1], found[3]);
-}
-PALETTE4D_INLINE void load_around(const Read<double>& read, int at, Lanes<double> (&found)[4]) {
-    for (int k = 0; k < 4; ++k) found[k] = load(read.around + k * kSize + at);
-}
-
 /// The values of the grid that was read, at the colours from `at` on; `idle` where it is not.
 template <class T>
-PALETTE4D_INLINE Lanes<T> value_at(const Read<T>& read, int at, T idle) {
+PALETTE4D_INLINE Lanes<T> value_at(const typename PickPlan<T>::Grid& grid, const Read<T>& read,
+                                   int at, T idle) {
     Lanes<T> around[4];
-    load_around(read, at, around);
+    read_grid(grid, read.node + at, load(read.part[0] + at), around);
     const Lanes<T> part_v = load(read.part[1] + at);
     const Lanes<T> dark = around[0] + part_v * (around[1] - around[0]),
                    light = around[2] + part_v * (around[3] - around[2]);
@@ -233,8 +199,6 @@ PALETTE4D_INLINE int reach(const typename PickPlan<T>::Grid& grid, Channels<cons
         store_index(read.node + at, select(inside, node, all(T(0))));
         store(read.inside + at, select(inside, all(T(1)), all(T(0))));
     }
-    // All of them before any is used: what was just stored in parts is slow to load as a whole.
-    for (int i = 0; i < found; ++i) read_grid(grid, reached[i], read);
     return found;
 }
 
@@ -253,7 +217,7 @@ PALETTE4D_INLINE void add_pick(const typename PickPlan<T>::One& pick, const Read
         min((grey + least) * all(pick.dark), min((one - grey + least) * all(pick.bright), one));
     Lanes<T> amount = hue + all(pick.plain) * light;
     amount = select(amount > one, all(T(2)) - one / amount, amount);
-    const Lanes<T> matte = value_at(read, at, T(0));
+    const Lanes<T> matte = value_at<T>(pick.matte, read, at, T(0));
     Lanes<T> share = matte * amount;
     if (!alone) {
         const Lanes<T> u = load(read.point[0] + at) - all(pick.at[0]),
@@ -330,7 +294,7 @@ void add(const PickPlan<T>& plan, Channels<const T> colour, Channels<T> moved, i
         int reached[kSize];
         const int found = reach<T>(plan.left, shown, count, read, reached);
         for (int i = 0; i < found; ++i) {
-            const Lanes<T> left = value_at(read, reached[i], T(1));
+            const Lanes<T> left = value_at(plan.left, read, reached[i], T(1));
             for (int c = 0; c < 3; ++c) {
                 store(moved[c] + reached[i], left * load(moved[c] + reached[i]));
             }
@@ -351,7 +315,7 @@ bool set(const PickPlan<float>& plan, Channels<const float> colour, Channels<flo
         int reached[kSize];
         const int found = reach<float>(plan.left, shown, count, read, reached);
         for (int i = 0; i < found; ++i)
-            store(moved[3] + reached[i], value_at(read, reached[i], 1.0f));
+            store(moved[3] + reached[i], value_at(plan.left, read, reached[i], 1.0f));
         some = true;
     }
     for (int at = 0; some && at < count; at += Lanes<float>::kCount) {

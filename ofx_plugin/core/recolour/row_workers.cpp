@@ -239,7 +239,8 @@ private:
         bool displace(Block<T>& block, int count) {
             if (usable_) {
                 kernels_.inside(plan_, block, count, tolerance_, shell_, scratch_.data());
-                finish(block, count);
+                // Colours inside the palette are not larger than it.
+                finish(block, count, plan_.mover_count > 0 && plan_.size <= kLargestPicked);
             } else {
                 std::fill_n(block.verdict, count, T(0));
             }
@@ -248,11 +249,12 @@ private:
             return inside == count;
         }
 
-        /// Adds the picks, and applies the strength.
-        void finish(Block<T>& block, int count) {
+        /// Adds the picks, and applies the strength. `small`: no good colour is above
+        /// kLargestPicked.
+        void finish(Block<T>& block, int count, bool small) {
             if (add_picks_) {
                 add_picks_(picks_, block.colour, block.moved, count);
-                if (sizeof(T) == sizeof(float)) leave_large(block, count);
+                if (sizeof(T) == sizeof(float) && !small) leave_large(block, count);
             }
             kernels_.move(block, count, strength_, divide_);
         }
@@ -305,7 +307,7 @@ private:
             const int count = outside_.count;
             outside_.count = 0;
             kernels_.closest(plan_, outside_.block, count, tolerance_, scratch_.data());
-            finish(outside_.block, count);
+            finish(outside_.block, count, false);
             for (int i = 0; i < count; ++i) {
                 settle(outside_, i, outside_.from[i], outside_.to[i]);
             }

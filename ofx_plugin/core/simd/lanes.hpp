@@ -86,18 +86,17 @@ PALETTE4D_INLINE Lanes<T> truncated(Lanes<T> a) {
     return {
         __builtin_convertvector(__builtin_convertvector(a.v, Whole), typename Lanes<T>::Vector)};
 }
+#if PALETTE4D_LANES_BYTES == 64
+PALETTE4D_INLINE Lanes<float> truncated(Lanes<float> a) {
+    return {_mm512_roundscale_ps(a.v, _MM_FROUND_TO_ZERO)};
+}
+#elif PALETTE4D_LANES_BYTES == 32
+PALETTE4D_INLINE Lanes<float> truncated(Lanes<float> a) {
+    return {_mm256_round_ps(a.v, _MM_FROUND_TO_ZERO)};
+}
+#endif
 PALETTE4D_INLINE void store_whole(int* to, Lanes<float> a) {
     const auto whole = __builtin_convertvector(a.v, Lanes<float>::Integers);
-    std::memcpy(to, &whole, sizeof whole);
-}
-PALETTE4D_INLINE Lanes<float> load_whole(const int* from) {
-    Lanes<float>::Integers whole;
-    std::memcpy(&whole, from, sizeof whole);
-    return {__builtin_convertvector(whole, Lanes<float>::Vector)};
-}
-/// Stores byte offsets of elements that are 16 bytes each.
-PALETTE4D_INLINE void store_offsets(unsigned* to, Lanes<float> a) {
-    const auto whole = __builtin_convertvector(a.v, Lanes<float>::Integers) << 4;
     std::memcpy(to, &whole, sizeof whole);
 }
 template <class T>
@@ -133,6 +132,25 @@ PALETTE4D_INLINE Lanes<T> abs(Lanes<T> a) {
 PALETTE4D_FUNCTIONS(float, ps)
 PALETTE4D_FUNCTIONS(double, pd)
 #undef PALETTE4D_FUNCTIONS
+/// In each four lanes: i and j of a, k and l of b.
+template <int i, int j, int k, int l>
+PALETTE4D_INLINE Lanes<float> shuffled(Lanes<float> a, Lanes<float> b) {
+    return {PALETTE4D_X86(shuffle_ps)(a.v, b.v, i | j << 2 | k << 4 | l << 6)};
+}
+/// Four values each from places[0], places[4], ... on.
+PALETTE4D_INLINE Lanes<float> load_fours(const float* from, const int* places) {
+    const auto four = [&](int i) { return _mm_loadu_ps(from + static_cast<unsigned>(places[i])); };
+#if PALETTE4D_LANES_BYTES == 16
+    return {four(0)};
+#elif PALETTE4D_LANES_BYTES == 32
+    return {_mm256_insertf128_ps(_mm256_castps128_ps256(four(0)), four(4), 1)};
+#else
+    __m512 found = _mm512_castps128_ps512(four(0));
+    found = _mm512_insertf32x4(found, four(4), 1);
+    found = _mm512_insertf32x4(found, four(8), 2);
+    return {_mm512_insertf32x4(found, four(12), 3)};
+#endif
+}
 template <class T>
 PALETTE4D_INLINE bool any(LaneMask<T> m) {
 #if PALETTE4D_LANES_BYTES == 16
@@ -170,6 +188,13 @@ PALETTE4D_INLINE Lanes<T> min(Lanes<T> a, Lanes<T> b) {
 template <class T>
 PALETTE4D_INLINE Lanes<T> max(Lanes<T> a, Lanes<T> b) {
     return select(a > b, a, b);
+}
+template <int i, int j, int k, int l>
+PALETTE4D_INLINE Lanes<float> shuffled(Lanes<float> a, Lanes<float> b) {
+    return {Lanes<float>::Vector{a.v[i], a.v[j], b.v[k], b.v[l]}};
+}
+PALETTE4D_INLINE Lanes<float> load_fours(const float* from, const int* places) {
+    return load(from + places[0]);
 }
 template <class T>
 PALETTE4D_INLINE bool any(LaneMask<T> m) {
