@@ -411,20 +411,19 @@ TEST(kernels_of_all_sets_agree_where_stages_need_them) {
                 for (std::size_t c = 0; c < 3; ++c) CHECK_NEAR(expected[c][i], exact[c], 1e-12);
             }
             std::fill_n(&expected_f[0][0], 256, 1.0f);
-            const bool some =
-                PickKernels::baseline().set(single.plan(), colour_f, expected_f, count);
+            PickKernels::baseline().set(single.plan(), colour_f, expected_f, count);
             for (const InstructionSet set : instruction_sets()) {
                 const PickKernels& kernels = kernels_of<PickKernels>(set);
                 std::fill_n(&found[0][0], 192, 0.25);
                 kernels.add_twofold(twofold.plan(), colour, found, count);
                 std::fill_n(&found_f[0][0], 256, 1.0f);
-                CHECK(kernels.set(single.plan(), colour_f, found_f, count) == some);
+                const bool some = kernels.set(single.plan(), colour_f, found_f, count);
                 for (std::size_t c = 0; c < 4; ++c) {
                     const std::size_t size = static_cast<std::size_t>(count);
                     if (c < 3) CHECK(std::memcmp(found[c], expected[c], size * 8) == 0);
-                    if (some || c == 3) {
-                        CHECK(std::memcmp(found_f[c], expected_f[c], size * 4) == 0);
-                    }
+                    CHECK(std::memcmp(found_f[c], expected_f[c], size * 4) == 0);
+                    const float still = c < 3 ? 0.0f : 1.0f;
+                    CHECK(some || std::count(found_f[c], found_f[c] + size, still) == count);
                 }
             }
         }
