@@ -162,6 +162,36 @@ def test_the_file_that_was_named_is_written_whatever_its_name(home: Path, name: 
     assert command(home, "info", name, hostile=False).returncode == 0
 
 
+@confines
+def test_a_fork_has_no_file_of_its_parent_or_of_another_child(tmp_path: Path) -> None:
+    """A pipe to another child would let it answer for that."""
+    (tmp_path / "held").touch()
+    program = (
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parents[1])!r})\n"
+        "import child_calls, json, os\n"
+        "from palette4d.common import sandbox\n"
+        "from palette4d.common.child import Child\n"
+        "sandbox.is_command, held = True, open('held')\n"
+        "with Child(reads=[]) as one, Child(reads=[]) as other:\n"
+        "    found = [child.call(child_calls.handles) for child in (one, other, one)]\n"
+        "    parents = [child._process._popen.__class__.__module__ for child in (one, other)]\n"
+        "print(json.dumps([found, parents]))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", program],
+        cwd=tmp_path,
+        env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    (one, other, again), kinds = json.loads(done.stdout)
+    assert kinds == ["multiprocessing.popen_fork"] * 2
+    assert sorted(one) == sorted(again)
+    assert not set(one) & set(other)
+    assert not [name for name in (*one, *other) if name.endswith("/held")]
+
+
 def test_where_the_kernel_cannot_on_is_an_error_and_auto_goes_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -23,6 +23,7 @@ def progress_bar(what: str, *, total: int | None, unit: str, hidden: bool) -> An
     """
     from tqdm import tqdm
 
+    tqdm.monitor_interval = 0  # no thread that draws: a process with threads cannot be forked
     if job.stream is None:
         file = unfiltered_stderr()
         return tqdm(total=total, desc=what, unit=unit, disable=hidden or None, file=file)

@@ -15,7 +15,7 @@ import types
 from collections.abc import Callable, Iterable, Iterator
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
-from multiprocessing.context import SpawnContext
+from multiprocessing.context import ForkContext, SpawnContext
 from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
@@ -146,22 +146,26 @@ class Child:
         self._own.close()
 
     def _start(self) -> None:
+        if self._reads is not None and self.megabytes is None and sandbox.may_fork():
+            # It needs no second import of all libraries, which takes half a second.
+            self._spawn(multiprocessing.get_context("fork"))
+            return
         # Spawned, not forked: the libraries run threads, which a fork would break.
-        context = multiprocessing.get_context("spawn")
         with _safe_path():
             if sys.platform != "win32":
                 # Its start ends the block of Ctrl-C.
                 resource_tracker.ensure_running()
-            self._spawn(context)
+            self._spawn(multiprocessing.get_context("spawn"))
 
-    def _spawn(self, context: SpawnContext) -> None:
+    def _spawn(self, context: ForkContext | SpawnContext) -> None:
         with _without_interrupts(), _without_main():
             self._pipe, theirs = context.Pipe()
             confined = None
             if self._reads is not None:
                 folder = files.temporary_folder(Path(tempfile.gettempdir()))
                 confined = self._reads, self._own.enter_context(folder)
-            arguments = (theirs, self.seconds, self.megabytes, confined)
+            inherited = _handles(but=theirs) if isinstance(context, ForkContext) else []
+            arguments = (theirs, self.seconds, self.megabytes, confined, inherited)
             self._process = context.Process(target=_serve, args=arguments, daemon=True)
             self._process.start()
             theirs.close()
@@ -221,13 +225,19 @@ def _serve(
     seconds: float | None,
     megabytes: int | None,
     confined: tuple[list[Path], Path] | None,
+    inherited: list[int],
 ) -> None:
+    if inherited:
+        sandbox.is_command = False
+        nothing = os.open(os.devnull, os.O_RDWR)
+        for handle in inherited:  # not closed: objects that know the number still exist
+            os.dup2(nothing, handle)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
     if confined is not None:
         reads, folder = confined
         tempfile.tempdir = str(folder)
         sandbox.confine(reads, [folder])
-        if (tracker := resource_tracker.getfd()) is not None:
+        if not inherited and (tracker := resource_tracker.getfd()) is not None:
             os.close(tracker)  # unconfined, it removes shared memory of any name
     if megabytes is not None:
         _limit(megabytes)
@@ -250,6 +260,16 @@ def _serve(
         if hasattr(signal, "alarm"):
             signal.alarm(0)
         pipe.send_bytes(answer)
+
+
+def _handles(but: Connection) -> list[int]:
+    """Return the open files that a fork is not to have: pipes to other children, locks."""
+    found = []
+    for handle in map(int, os.listdir("/proc/self/fd")):
+        with contextlib.suppress(OSError):  # that of the list itself
+            os.fstat(handle)
+            found.append(handle)
+    return sorted(set(found) - {0, 1, 2, but.fileno()})
 
 
 def _limit(megabytes: int) -> None:

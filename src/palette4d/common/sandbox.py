@@ -80,6 +80,11 @@ def of_command() -> bool:
     return is_command and wanted()
 
 
+def may_fork() -> bool:
+    """Whether this is a command of one thread, whose forks are confined."""
+    return of_command() and _is_alone()
+
+
 def confine(
     reads: Iterable[Path] = (), writes: Iterable[Path] = (), *, starts: bool = False
 ) -> None:
@@ -203,10 +208,14 @@ def _python() -> list[Path]:
     return [Path(sys.executable), *(each for at in loaders for each in at.glob("ld-linux*.so.*"))]
 
 
+def _is_alone() -> bool:
+    return len(os.listdir("/proc/self/task")) == 1
+
+
 def _wait_until_alone() -> None:
     """Wait for the end of other threads, which would not be confined."""
     deadline = time.monotonic() + 2
-    while len(list(Path("/proc/self/task").iterdir())) > 1:
+    while not _is_alone():
         if time.monotonic() > deadline:
             raise Palette4dError(
                 "the process has other threads already, which would not be confined; use "
