@@ -197,8 +197,8 @@ def bake(
     settings = BakeSettings(size, strength, format, shaper, domain, max_error, space, ocio_config)
     output = Path(path)
     format_ = format_of(output, format)
-    check_target(output, force)
     sidecar, data, file = _opened(source)
+    check_target(output, force, file)
     check_settings(settings, format_, sidecar, frame)
     found_space = space_of(data, sidecar, space, ocio_config)
     image, image_frame = _picture(file, sidecar, frame, clip)
@@ -286,14 +286,14 @@ def _opened(
     return source.grade.core, sidecars.dumps(fields).encode("utf-8"), source.path
 
 
-def check_target(path: Path, force: bool) -> None:
+def check_target(path: Path, force: bool, sidecar: Path | None) -> None:
     """Refuse a file that may not be written."""
     if path.exists() and not path.is_file() and not path.is_dir():
         raise Palette4dError(
             f"{path}: found a device or a pipe, expected a file name; for standard output run "
             "`palette4d bake -o - --format …`"
         )
-    refuse_existing(path, force)
+    refuse_existing(path, force, inputs=[sidecar])
 
 
 def check_settings(

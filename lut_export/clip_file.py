@@ -115,7 +115,8 @@ def write_clip(
             f"{output}: found no extension {known}; name the file "
             + " or ".join(f"NAME{suffix}" for suffix in forms)
         )
-    refuse_existing(output, force)
+    file = source.path if isinstance(source, Document) else Path(source)
+    refuse_existing(output, force, inputs=[file])
     sidecar = _source_of(source)
     clip = clip_text(sidecar, frames, output, textures=dialect.textures)
     name = " ".join(printable(str(sidecar.clip["name"])).split())

@@ -306,7 +306,7 @@ class _Export:
             target = request.folder / names[frame]
             if target.exists():
                 # A file without an entry may match: a killed export may have left it.
-                check_target(target, request.force or frame not in known)
+                check_target(target, request.force or frame not in known, request.sidecar)
         # Absolute: other processes may have another working folder.
         clip = None if request.clip is None else str(Path.cwd() / request.clip)
         settings = replace(settings, ocio_config=from_anywhere(settings.ocio_config))
@@ -329,7 +329,7 @@ class _Export:
             return
         entry, data = outcome
         try:
-            _put(self.request.folder / self.tasks[frame].file, data, self.request.force)
+            _put(self.request.folder / self.tasks[frame].file, data, self.request)
         except WriteError:
             raise  # all other files would fail, too
         except Palette4dError as error:
@@ -362,12 +362,12 @@ def bake_frame(task: FrameTask, threads: int) -> tuple[Entry, bytes]:
         return entry_of(path, result), path.read_bytes()
 
 
-def _put(target: Path, data: bytes, force: bool) -> None:
+def _put(target: Path, data: bytes, request: Request) -> None:
     """Write a file atomically; one with the same bytes is kept."""
     if target.is_file() and target.read_bytes() == data:
         return
-    check_target(target, force)
-    with replacing(target, force=force) as temporary:
+    check_target(target, request.force, request.sidecar)
+    with replacing(target, force=request.force) as temporary:
         temporary.write_bytes(data)
 
 

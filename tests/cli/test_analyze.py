@@ -93,6 +93,14 @@ def test_edits_are_not_lost(clip, tmp_path, capsys):
     assert json.loads(out.read_text())["edits"] == {"vertices": [], "stops": []}
 
 
+def test_no_picture_is_replaced_by_a_sidecar(clip, tmp_path, capsys):
+    frame = clip / "shot.1001.png"
+    before = frame.read_bytes()
+    assert main.main(["analyze", str(clip), "-o", str(frame), *STATIC, "--drop-edits"]) == 1
+    assert "a picture" in capsys.readouterr().err
+    assert frame.read_bytes() == before
+
+
 def test_a_new_version_keeps_handles_and_grade(clip, tmp_path, capsys):
     out = tmp_path / "shot.p4d.json"
     assert main.main(["analyze", str(clip), "-o", str(out), "--quiet"]) == 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from fractions import Fraction
@@ -159,6 +160,16 @@ class TestFiles:
         os.mkfifo(pipe)
         assert "-o - --format" in error(capsys, "-o", pipe, "--force")
         assert pipe.is_fifo()
+
+    def test_the_sidecar_itself_is_not_replaced(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        for name, verb in (("a.cube", "bake --frame 4 -o"), ("a.dctl", "export --dctl")):
+            own = tmp_path / name
+            shutil.copyfile(EDITED, own)
+            assert main([verb.split()[0], str(own), *verb.split()[1:], str(own), "--force"]) == 1
+            assert "read for this output" in capsys.readouterr().err
+            assert own.read_bytes() == Path(EDITED).read_bytes()
 
     def test_overwriting_needs_force(
         self, tmp_path: Path, capsys: pytest.CaptureFixture[str]

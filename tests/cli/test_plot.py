@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 import json
+import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from edits import sequence
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from numpy.typing import NDArray
 
@@ -394,3 +397,40 @@ def test_settings_of_the_working_folder_are_not_read(tmp_path: Path) -> None:
     assert "matplotlibrc" not in run.stderr
     assert "stranger" not in run.stderr
     assert (tmp_path / "plot.svg").is_file()
+
+
+def test_a_backend_that_does_not_exist_and_no_place_for_fonts(tmp_path: Path) -> None:
+    (tmp_path / "tmp").mkdir()
+    (tmp_path / "file").touch()
+    environment = {
+        **os.environ,
+        "MPLBACKEND": "rubbish",
+        "MPLCONFIGDIR": str(tmp_path / "file" / "config"),
+        "TMPDIR": str(tmp_path / "tmp"),
+    }
+    sidecar, out = GOLDEN / "v1_edited.p4d.json", tmp_path / "out.png"
+    done = subprocess.run(
+        [sys.executable, "-P", "-m", "palette4d", "plot", str(sidecar), "-o", str(out)],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    assert out.is_file()
+    assert not list((tmp_path / "tmp").iterdir())
+
+
+def test_what_a_picture_shows_is_not_replaced_by_it(tmp_path: Path) -> None:
+    clip, sidecar = tmp_path / "clip", tmp_path / "named.svg"
+    clip.mkdir()
+    pattern = sequence(clip, "frame", 0, 4)
+    shutil.copyfile(GOLDEN / "v1_edited.p4d.json", sidecar)
+    frame = clip / "frame.0002.png"
+    before = frame.read_bytes(), sidecar.read_bytes()
+    words = ["plot", str(sidecar), "--clip", str(pattern), "--force", "-o"]
+    assert main([*words, str(frame)]) == 1
+    assert main([*words, str(sidecar)]) == 1
+    assert (frame.read_bytes(), sidecar.read_bytes()) == before
+    assert main([*words, str(clip / "other.png"), "--width", "400"]) == 0

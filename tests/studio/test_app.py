@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
 import OpenImageIO as oiio
 import pytest
+from PySide6.QtCore import QObject
 from PySide6.QtNetwork import QLocalSocket
 
 from palette4d.common.errors import Palette4dError
@@ -78,6 +80,30 @@ def test_another_start_with_the_same_sidecar_brings_this_window_to_the_frame(
     assert brought_forward(sidecar, qtbot)
     qtbot.waitUntil(lambda: opened.session.frame == 9, timeout=5000)
     assert not instance.bring_forward(sidecar.with_name("other.p4d.json"), None)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names of sockets are private")
+def test_no_other_user_can_take_the_name_of_a_socket(
+    sidecar: Path, monkeypatch: pytest.MonkeyPatch, qtbot: Any
+) -> None:
+    """In the folder of temporary files each user could listen there first."""
+    with tempfile.TemporaryDirectory(dir="/tmp") as name:
+        run, state = Path(name, "run"), Path(name, "state")
+        run.mkdir()
+        monkeypatch.setenv("XDG_RUNTIME_DIR", str(run))
+        monkeypatch.setenv("XDG_STATE_HOME", str(state))
+        assert Path(instance.name_of(sidecar)).parent == run
+        run.chmod(0o777)
+        parent, heard = QObject(), []
+        listener = instance.Listener(parent, heard.append)
+        listener.listen(sidecar)
+        socket = Path(instance.name_of(sidecar))
+        assert socket.parent == state / "palette4d"
+        assert socket.is_socket()
+        assert not socket.parent.stat().st_mode & 0o077
+        assert brought_forward(sidecar, qtbot)
+        assert heard == [9]
+        listener.listen(None)
 
 
 HOSTILE = {

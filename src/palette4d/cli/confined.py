@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import atexit
 import contextlib
 import os
+import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -54,11 +56,12 @@ def confined(args: argparse.Namespace) -> Iterator[None]:
     if not sandbox.wanted() or (needs := _needs(args)) is None:
         yield
         return
-    if args.verb == "plot":
-        from palette4d.plotting import load_matplotlib
-
-        load_matplotlib()  # it reads and writes its list of fonts
     with writer_for(needs.writes) as writer:
+        if args.verb == "plot":
+            from palette4d.plotting import load_matplotlib
+
+            load_matplotlib()  # it reads and writes its list of fonts
+            atexit.unregister(shutil.rmtree)  # where it has no home: the writer's folder goes
         folders = [] if writer.folder is None else [writer.folder]
         sandbox.confine(needs.paths(), folders, starts=needs.starts)
         yield

@@ -8,7 +8,7 @@ import shutil
 import stat
 import sys
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -32,8 +32,13 @@ _ACCESS_LIST = "system.posix_acl_access"
 _MOST_LINKS = 40
 
 
-def refuse_existing(path: Path, force: bool, made: Path | None = None) -> None:
-    """Check that a file may be written to `path`; the folder `made` need not exist yet."""
+def refuse_existing(
+    path: Path, force: bool, made: Path | None = None, inputs: Iterable[Path | None] = ()
+) -> None:
+    """Check that a file may be written to `path`, which is none of the inputs.
+
+    The folder `made` need not exist yet.
+    """
     if path.is_dir():
         raise Palette4dError(f"{path}: found a folder, expected a file name for the output")
     if path.exists() and not path.is_file():
@@ -47,6 +52,11 @@ def refuse_existing(path: Path, force: bool, made: Path | None = None) -> None:
         raise Palette4dError(f"{path}: there is no folder {path.parent}; create it first")
     if path.exists() and not force:
         raise Palette4dError(f"{path}: {EXISTS}")
+    if path.exists() and any(one is not None and same_file(one, path) for one in inputs):
+        raise Palette4dError(
+            f"{path}: found a file that is read for this output, expected another; choose another "
+            "name or folder"
+        )
     if path.exists() and path.stat().st_nlink > 1:
         raise Palette4dError(
             f"{path}: found a file of {path.stat().st_nlink} names (hard links), which would part "

@@ -26,6 +26,11 @@ def state_folder(system: str = sys.platform) -> Path:
     return _named("XDG_STATE_HOME") or Path.home() / ".local/state"
 
 
+def runtime_folder() -> Path | None:
+    """Return the user's folder for sockets, where the system has one (XDG)."""
+    return _named("XDG_RUNTIME_DIR")
+
+
 def _named(variable: str) -> Path | None:
     """Return a variable's folder; the XDG standard lets programs ignore relative ones."""
     folder = Path(os.environ.get(variable, ""))

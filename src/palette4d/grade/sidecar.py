@@ -16,7 +16,7 @@ from palette4d.common.files import link_target, refuse_existing, replacing
 from palette4d.common.locking import locked
 from palette4d.common.text import counted
 from palette4d.grade.members import Fields, edits_fields, edits_from
-from palette4d.media.clip_sequence import IMAGE_EXTENSIONS, MOVIE_EXTENSIONS
+from palette4d.media.clip_sequence import IMAGE_EXTENSIONS, MOVIE_EXTENSIONS, extension
 
 #: The core's view of a file, its members and its bytes.
 Saved = tuple[_core.Sidecar, Fields, bytes]
@@ -201,6 +201,11 @@ def existing(target: Path, on_edits: OnEdits) -> Saved | None:
     """Return what a save would replace; None if no edits would be lost."""
     if on_edits not in ("refuse", "keep", "drop"):
         raise ValueError(f"on_edits: found {on_edits!r}, expected 'refuse', 'keep' or 'drop'")
+    if extension(target) in IMAGE_EXTENSIONS | MOVIE_EXTENSIONS and target.exists():
+        raise Palette4dError(
+            f"{target}: found a picture or a movie, expected a sidecar or no file; choose another "
+            "name"
+        )
     if on_edits == "drop":
         return None
     try:

@@ -68,7 +68,7 @@ def plot(
     from palette4d.common.files import refuse_existing, replacing
     from palette4d.grade.clip_colours import ClipColours, track_shares
     from palette4d.grade.document import Document
-    from palette4d.media.source_clip import frame_colours
+    from palette4d.media.source_clip import find_clip, frame_colours
     from palette4d.plotting import page, style
     from palette4d.plotting.frames import default_frames
     from palette4d.plotting.rows import PlottedPalette
@@ -82,6 +82,10 @@ def plot(
     refuse_existing(output, force)
     if not isinstance(document, Document):
         document = Document.load(document)
+    if output.exists():
+        found = find_clip(document.path or Path("document"), document.grade.core.clip, clip)
+        frames_of_clip = () if found is None else map(found.file, found.frames)
+        refuse_existing(output, force, inputs=(document.path, *frames_of_clip))
     graded = document.version(version)
     sidecar = graded.grade.core
     stored = ClipColours(sidecar.polytope, graded.fields())
@@ -115,14 +119,18 @@ def plot(
 def load_matplotlib() -> None:
     """Import matplotlib without its warnings, such as of where its cache is without a home folder.
 
-    It would read a matplotlibrc of the folder that it is imported in.
+    It would read a matplotlibrc of the folder that it is imported in, and refuse an MPLBACKEND that
+    it does not know; no backend is used.
     """
     logger = logging.getLogger("matplotlib")
     before = logger.level
     logger.setLevel(logging.ERROR)
     away = contextlib.chdir(Path(__file__).parent)
+    backend = os.environ.pop("MPLBACKEND", None)
     try:
         with contextlib.suppress(FileNotFoundError), away:  # the folder may be gone
             importlib.import_module("matplotlib.font_manager")
     finally:
         logger.setLevel(before)
+        if backend is not None:
+            os.environ["MPLBACKEND"] = backend

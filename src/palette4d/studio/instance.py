@@ -1,17 +1,21 @@
 """One window for a sidecar: a second `palette4d studio` of it brings the first to the front.
 
-Each window listens on a local socket named after its sidecar; only this user may connect.
+Each window listens on a local socket named after its sidecar, in a folder where no other user can
+make one; only this user may connect.
 """
 
+import contextlib
 import hashlib
 import json
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QObject
 from PySide6.QtNetwork import QLocalServer, QLocalSocket
 
+from palette4d.common.folders import runtime_folder, state_folder
 from palette4d.common.json_files import parse
 
 #: Milliseconds that a window has for its answer.
@@ -20,12 +24,28 @@ PATIENCE = 1000
 #: The longest question.
 BYTES = 4096
 
+#: The longest path of a socket: systems allow 103 to 107 bytes, and Qt binds a longer one first.
+LONGEST = 90
+
 
 def name_of(sidecar: str | os.PathLike[str]) -> str:
-    """Return the socket's name for a sidecar."""
+    """Return the socket's name for a sidecar: a path, or one in the folder of temporary files."""
     user = os.getuid() if hasattr(os, "getuid") else 0
     key = f"{user} {os.path.realpath(sidecar)}"
-    return f"palette4d-studio-{hashlib.sha256(os.fsencode(key)).hexdigest()[:20]}"
+    name = f"palette4d-studio-{hashlib.sha256(os.fsencode(key)).hexdigest()[:20]}"
+    for folder in _folders():
+        path = str(folder / name)
+        if _ours(folder) and not folder.stat().st_mode & 0o022 and len(path) <= LONGEST:
+            return path
+    return name
+
+
+def _folders() -> list[Path]:
+    """Return folders for sockets; on Windows they have none, on macOS the usual one is private."""
+    if sys.platform in ("win32", "darwin"):
+        return []
+    own = runtime_folder()
+    return [*([] if own is None else [own]), state_folder() / "palette4d"]
 
 
 def bring_forward(sidecar: str | os.PathLike[str], frame: float | None) -> bool:
@@ -45,15 +65,15 @@ def is_open(sidecar: str | os.PathLike[str]) -> bool:
     """Whether a window has this sidecar open."""
     socket = QLocalSocket()
     socket.connectToServer(name_of(sidecar))
-    return socket.waitForConnected(100)
+    return socket.waitForConnected(100) and _ours(socket.fullServerName())
 
 
-def _ours(socket: str) -> bool:
-    """Whether a socket is this user's: in the folder of temporary files, anyone can make one."""
+def _ours(path: str | Path) -> bool:
+    """Whether a socket, or its folder, is this user's."""
     if not hasattr(os, "getuid"):
         return True
     try:
-        return Path(socket).stat().st_uid == os.getuid()
+        return Path(path).stat().st_uid == os.getuid()
     except OSError:
         return False
 
@@ -85,11 +105,11 @@ class Listener(QObject):
             self._server = None
         if sidecar is None:
             return
-        probe = QLocalSocket()
-        probe.connectToServer(name_of(sidecar))
-        if probe.waitForConnected(100):  # another window has it; that one goes on listening
-            probe.disconnectFromServer()
+        if is_open(sidecar):  # another window has it; that one goes on listening
             return
+        if sys.platform == "linux" and not os.path.isabs(name_of(sidecar)):
+            with contextlib.suppress(OSError):
+                _folders()[-1].mkdir(mode=0o700, parents=True, exist_ok=True)
         QLocalServer.removeServer(name_of(sidecar))  # of a window that was killed
         server = QLocalServer(self)
         server.setSocketOptions(QLocalServer.SocketOption.UserAccessOption)
