@@ -60,7 +60,7 @@ def speak_to_the_tracker() -> bool:
 def handles() -> list[str]:
     """Return what the open files of this process are, without the standard ones."""
     found = []
-    for handle in set(os.listdir("/proc/self/fd")) - {"0", "1", "2"}:
+    for handle in list(Path("/proc/self/fd").iterdir()):
         with contextlib.suppress(OSError):  # that of the list itself
-            found.append(str(Path("/proc/self/fd", handle).readlink()))
+            found += [str(handle.readlink())] if int(handle.name) > 2 else []
     return [one for one in found if one != os.devnull]

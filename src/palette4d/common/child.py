@@ -264,12 +264,12 @@ def _serve(
 
 def _handles(but: Connection) -> list[int]:
     """Return the open files that a fork is not to have: pipes to other children, locks."""
-    found = []
-    for handle in map(int, os.listdir("/proc/self/fd")):
+    found = set()
+    for each in list(Path("/proc/self/fd").iterdir()):
         with contextlib.suppress(OSError):  # that of the list itself
-            os.fstat(handle)
-            found.append(handle)
-    return sorted(set(found) - {0, 1, 2, but.fileno()})
+            os.fstat(int(each.name))
+            found.add(int(each.name))
+    return sorted(found - {0, 1, 2, but.fileno()})
 
 
 def _limit(megabytes: int) -> None:

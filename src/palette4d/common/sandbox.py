@@ -209,7 +209,7 @@ def _python() -> list[Path]:
 
 
 def _is_alone() -> bool:
-    return len(os.listdir("/proc/self/task")) == 1
+    return len(list(Path("/proc/self/task").iterdir())) == 1
 
 
 def _wait_until_alone() -> None:

@@ -107,7 +107,7 @@ class Listener(QObject):
             return
         if is_open(sidecar):  # another window has it; that one goes on listening
             return
-        if sys.platform == "linux" and not os.path.isabs(name_of(sidecar)):
+        if sys.platform == "linux" and not Path(name_of(sidecar)).is_absolute():
             with contextlib.suppress(OSError):
                 _folders()[-1].mkdir(mode=0o700, parents=True, exist_ok=True)
         QLocalServer.removeServer(name_of(sidecar))  # of a window that was killed
