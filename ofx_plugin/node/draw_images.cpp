@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 namespace palette4d::node {
@@ -30,6 +31,12 @@ std::vector<float> mask_of(const Image& mask, const OfxRectI& rows) {
     return shares;
 }
 
+/// Whether its rows can be read as floats where they are: hosts may put rows at any byte.
+bool is_aligned(const Image& image) {
+    const auto place = reinterpret_cast<std::uintptr_t>(image.data);
+    return (place | static_cast<std::uintptr_t>(image.row_bytes)) % alignof(float) == 0;
+}
+
 }  // namespace
 
 void draw(const Image& in, const Image& out, const OfxRectI& area, const NodeDrawing& drawing) {
@@ -39,7 +46,7 @@ void draw(const Image& in, const Image& out, const OfxRectI& area, const NodeDra
     if (is_empty(covered)) return;
     const bool edit_alone = drawing.edit_alone() && !drawing.mask;
     if (options.output == Output::kRecoloured && options.keep == 0 && options.mix == 1 &&
-        !drawing.mask && in.depth == Depth::kFloat) {
+        !drawing.mask && in.depth == Depth::kFloat && is_aligned(in) && is_aligned(out)) {
         const int width = covered.x2 - covered.x1, height = covered.y2 - covered.y1;
         draw_edit({reinterpret_cast<const float*>(in.at(covered.x1, covered.y1)), width, height,
                    in.channels, in.row_bytes},

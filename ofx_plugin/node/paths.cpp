@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <string_view>
 #include <vector>
 
 #include "sidecar/clip_name.hpp"
@@ -112,15 +113,21 @@ std::string without_project(const std::string& path) {
         return path;
     }
     for (std::size_t at = path.find('/', 1); at != std::string::npos; at = path.find('/', at + 1)) {
-        const std::string rest = path.substr(at + 1);
+        const std::string_view rest = std::string_view(path).substr(at + 1);
         const auto starts = [&](const char* with) { return rest.rfind(with, 0) == 0; };
         // Natron's own variable, chosen before the project had a folder.
-        if (starts(kProject)) return path.substr(0, at + 1) + rest.substr(std::strlen(kProject));
+        if (starts(kProject)) {
+            return path.substr(0, at + 1).append(rest.substr(std::strlen(kProject)));
+        }
         const bool quoted = (starts("\"") || starts("'")) && rest.size() > 1 &&
                             rest.find(rest[0], 1) == rest.size() - 1;
         // A variable further inside a path of the user's own is a folder's name.
-        const bool variable = (starts("$") || starts("%")) && native(expanded(rest)).is_absolute();
-        if (variable || rest == "~" || starts("~/") || starts("file:/") || quoted) return rest;
+        const auto first = [&] { return std::string(rest.substr(0, rest.find_first_of("/\\"))); };
+        const bool variable =
+            (starts("$") || starts("%")) && native(expanded(first()) + "/").is_absolute();
+        if (variable || rest == "~" || starts("~/") || starts("file:/") || quoted) {
+            return std::string(rest);
+        }
     }
     return path;
 }
@@ -266,7 +273,9 @@ bool same_clip(const std::string& media, const std::string& source) {
     return name_of(media) == name_of(source);
 }
 
-std::string meant(const std::string& path) { return unpasted(without_project(path)); }
+std::string meant(const std::string& path) {
+    return path.size() > kLongestPath ? path : unpasted(without_project(path));
+}
 
 std::string expanded(const std::string& path) {
     std::string result, name;

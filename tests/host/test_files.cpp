@@ -40,6 +40,7 @@ TEST(unusable_sidecars_pass_the_picture_through) {
     std::string many = "a";  // to look at each folder of these took hours
     while (many.size() < 10u << 20) many += "/$a" + many;
     bad.emplace_back(many, "at most 32768");
+    bad.emplace_back(std::string(10 << 20, '/'), "at most 32768");
     std::string newer = whole;
     newer.replace(newer.find("\"version\": 1"), 12, "\"version\": 9");
     bad.emplace_back(write("newer.p4d.json", newer), "/version");
@@ -48,7 +49,7 @@ TEST(unusable_sidecars_pass_the_picture_through) {
                          "");
     }
     for (const auto& [path, word] : bad) {
-        scene.instance->set("sidecar", path);
+        scene.change("sidecar", path);  // the status, too, looks at it
         CHECK(scene.render() == scene.unchanged());
         EXPECT(!scene.message().empty(), "no message for " + path);
         EXPECT(scene.message().find(word) != std::string::npos,

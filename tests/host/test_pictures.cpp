@@ -1,4 +1,5 @@
 // Pictures through the node against the core, byte for byte.
+#include <cstring>
 #include <thread>
 
 #include "harness.hpp"
@@ -93,6 +94,21 @@ TEST(render_windows_and_tiles) {
     Picture untouched(layout);
     CHECK(node.instance->render(5, &source, untouched, rect(7, 7, 7, 9)) == kOfxStatOK);
     CHECK(untouched.storage() == Picture(layout).storage());
+}
+
+TEST(rows_of_floats_at_any_byte) {
+    Shown node;
+    const std::vector<unsigned char> expected = node.render();
+    Layout odd = node.layout;
+    odd.padding = 2;
+    Picture source(odd), output(odd);
+    const OfxRectI& b = odd.bounds;
+    for (int y = b.y1; y < b.y2; ++y) {
+        const int bytes = odd.width() * odd.pixel_bytes();
+        std::memcpy(source.at(b.x1, y), node.source.at(b.x1, y), static_cast<std::size_t>(bytes));
+    }
+    CHECK(node.instance->render(2, &source, output, b) == kOfxStatOK);
+    CHECK(output.pixels(b) == expected);
 }
 
 TEST(a_window_beyond_the_output_is_cut) {
