@@ -225,10 +225,10 @@ lock: $(SUPPLY)/.installed ## the newest versions of all that make downloads, pi
 		compile windows-python$$version $(SUPPLY)/in.txt --no-deps; \
 	done
 
-# PyPI answers; what Wine needs is old, and stays in Wine. What palette4d itself compiles in stands in the wheel's own list.
+# PyPI answers, for each of them (--strict); what Wine needs is old, and stays in Wine. What palette4d itself compiles in stands in the wheel's own list.
 audit: $(SUPPLY)/.installed ## known faults of all that is pinned (asks PyPI)
 	@for lock in $(wildcard locks/*.txt); do \
-		echo "== $$lock"; $(SUPPLY)/bin/pip-audit --require-hashes --disable-pip -r $$lock || exit; \
+		echo "== $$lock"; $(SUPPLY)/bin/pip-audit --strict --require-hashes --disable-pip -r $$lock || exit; \
 	done
 
 # What is compiled into the wheel stands in its own list, palette4d-*.dist-info/sboms/.
@@ -283,9 +283,9 @@ test: ## what a change must pass: all but the slow tests
 # libFuzzer, a wheel built as pip builds it for users, and what a release holds.
 test-all: ## everything, before a release
 	$(MAKE) SLOW=1 test test-threads wheel test-reproducible
-	$(MAKE) FUZZ_SECONDS=600 test-fuzz fuzz-coverage audit
+	$(MAKE) FUZZ_SECONDS=600 test-fuzz fuzz-coverage
 	$(MAKE) wheels-again test-bundles test-wheels
-	$(MAKE) test-windows
+	$(MAKE) test-windows audit
 	@echo "== all of make test-all passed"
 
 wheel: build/wheel.stamp ## the wheel

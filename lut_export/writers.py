@@ -37,10 +37,14 @@ class Description:
 Writer = Callable[[Lut3D, Description], str]
 
 
+#: Letters of a line; OpenColorIO reads no CLF with some thousand in an attribute.
+LONGEST = 500
+
+
 def one_line(text: str) -> str:
-    """Return `text` fit for a comment line or an XML value: printable, no line breaks."""
-    kept = "".join(c if c.isprintable() else " " for c in text)
-    return " ".join(kept.split())
+    """Return `text` fit for a comment line or an XML value: printable, no line breaks, not long."""
+    kept = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    return kept if len(kept) <= LONGEST else f"{kept[:LONGEST]}…"
 
 
 def lut3d(values: Any) -> Any:

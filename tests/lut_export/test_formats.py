@@ -259,3 +259,12 @@ class TestMaxError:
         with pytest.raises(Palette4dError, match="are clamped: choose a format with a shaper"):
             bake(linear_sidecar, 4.0, out, size=6, max_error=0.002, clip=bright_picture)
         assert [path.name for path in tmp_path.iterdir()] == ["cube.p4d.json"]
+
+
+def test_a_name_of_any_length_can_be_read_back(
+    write_sidecar: Callable[..., Path], tmp_path: Path
+) -> None:
+    sidecar = write_sidecar(lambda rgb: (rgb[0] / 2, rgb[1], rgb[2]), name="n" * 5000)
+    out = tmp_path / "long.clf"
+    bake(sidecar, 5, out, size=5)
+    assert read_back(out, np.full((1, 3), 0.5, np.float32), "tetrahedral")[0, 0] < 0.4

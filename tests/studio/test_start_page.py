@@ -34,6 +34,18 @@ def test_recent_files_have_pictures_and_open(
     assert not page.isVisible()
 
 
+@pytest.mark.parametrize("kept", [True, 5, b"\xff", {"a": 1}, ["x" * 9999, "/dev/zero", 7, ""]])
+def test_settings_that_hold_anything_stop_no_window(
+    window: Window, sidecar: Path, kept: Any
+) -> None:
+    for name in ("recent", "open"):
+        window.settings.setValue(name, kept)
+    window.start.fill()
+    window.files.offer_crashed()
+    window.open_path(str(sidecar))
+    assert window.session.path == sidecar
+
+
 def test_the_sample_is_made_analysed_and_opened(
     window: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, qtbot: Any
 ) -> None:

@@ -14,6 +14,7 @@ from palette4d.studio import texts
 from palette4d.studio.instance import is_open
 from palette4d.studio.paths import sequence_of, sidecar_of
 from palette4d.studio.session import recovered
+from palette4d.studio.start_page import is_there
 
 if TYPE_CHECKING:
     from palette4d.studio.window import Window
@@ -85,7 +86,7 @@ class FileMenu:
         marked = [each for each in self._listed("open") if each != self._marked]
         alive = [each for each in marked if is_open(each)]
         self.window.settings.setValue("open", [*alive, *([self._marked] if self._marked else [])])
-        lost = next((each for each in marked if each not in alive and Path(each).is_file()), None)
+        lost = next((each for each in marked if each not in alive and is_there(each)), None)
         if lost is not None:
             text = texts.CRASHED.format(name=Path(lost).name)
             reopens = {texts.REOPEN: lambda: self.open_path(lost)}
@@ -93,7 +94,8 @@ class FileMenu:
 
     def _listed(self, name: str) -> list[str]:
         found: Any = self.window.settings.value(name, [])
-        return [found] if isinstance(found, str) else [str(each) for each in found or []]
+        listed = found if isinstance(found, list) else [found]  # the file may hold anything
+        return [each for each in listed if isinstance(each, str)]
 
     def open_shot(self, path: Path) -> None:
         """Open a shot of the list."""
