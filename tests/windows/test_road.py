@@ -119,7 +119,7 @@ def test_errors_say_what_to_do_in_utf8(places: tuple[Path, Path], windows: Run) 
 
 
 def test_files_locks_and_jobs(windows_pytest: Run, repo_root: Path, tmp_path: Path) -> None:
-    for name in ("wine.py", "common/test_windows.py"):
+    for name in ("wine.py", "common/conftest.py", "common/test_windows.py"):
         shutil.copy(repo_root / "tests" / name, tmp_path)
     done = windows_pytest("-q", "--rootdir", ".", "test_windows.py", cwd=tmp_path)
     assert done.returncode == 0, done.stdout
