@@ -479,6 +479,7 @@ test-wheels: $(RELEASE)/wheels/SHA256SUMS-wheels $(LINUX_TAR) $(TEST_VENV)/.inst
 
 # Wine runs what was unpacked; the tests compare it with Linux.
 test-windows: $(TEST_VENV)/.installed $(WINDOWS_ZIP) ## the .zip for Windows, under Wine
+	$(call release-build,,windows-tests)
 	@tools/wine.sh "$(CURDIR)/$(RELEASE)/wine" $(WINDOWS_ZIP)
 	@rm -rf build/test-run && mkdir -p build/test-run && cd build/test-run && \
 		PALETTE4D_WINDOWS="$(CURDIR)/$(RELEASE)/wine" "$(CURDIR)/$(TEST_VENV)/bin/python" -P -m pytest \

@@ -24,7 +24,6 @@ built() {
         --config-settings=cmake.define.PALETTE4D_ZIG="$PALETTE4D_ZIG" \
         --config-settings=cmake.define.PALETTE4D_ZIG_TARGET="$target" \
         --config-settings=cmake.define.PALETTE4D_WERROR=ON \
-        --config-settings=cmake.define.PALETTE4D_UNITY=OFF \
         --config-settings=cmake.define.PALETTE4D_BUILD_PLUGIN=OFF \
         --config-settings=cmake.define.PALETTE4D_READY_BUNDLE="$bundle" "$@"
 }
