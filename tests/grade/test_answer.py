@@ -240,8 +240,12 @@ def test_a_hold_on_what_the_pick_floods_is_no_fault(monkeypatch: pytest.MonkeyPa
     document.pick(0, pixel=(40.0, 60.0), box=9, to="#2040b0", reach=3)
     before = again(document).share
     hold = document.hold(0, pixel=(90.0, 60.0), box=9)
-    assert again(document).share < before - 0.1
-    assert not again(document, hold.id).notes
+    after = again(document).share
+    assert after < before - 0.1
+    (told,) = again(document, hold.id).notes
+    assert not told.warns
+    assert percent(after) in told.words
+    assert percent(before) in told.words
 
 
 def test_a_hold_helps_in_its_own_frame(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -257,7 +261,8 @@ def test_a_hold_helps_in_its_own_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     )
     document.pick(0, pixel=(40.0, 60.0), box=9, to="#2040b0", reach=3)
     hold = document.hold(1, pixel=(140.0, 60.0), box=9)
-    assert not again(document, hold.id).notes
+    (told,) = again(document, hold.id).notes
+    assert not told.warns
 
 
 def test_a_marked_area_is_no_other_thing(monkeypatch: pytest.MonkeyPatch) -> None:

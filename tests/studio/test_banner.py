@@ -149,10 +149,14 @@ def test_a_clip_that_states_no_colour_space_says_what_is_assumed(
 
 
 def test_after_a_crash_the_sidecar_is_offered_again(
-    window: Window, sidecar: Path, tmp_path: Path, qtbot: Any
+    window: Window, sidecar: Path, tmp_path: Path, qtbot: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     home = tmp_path / "home"
     home.mkdir()
+    # Both look for the other's socket in one place.
+    monkeypatch.setenv("HOME", str(home))
+    for folder in ("XDG_RUNTIME_DIR", "XDG_STATE_HOME"):
+        monkeypatch.delenv(folder, raising=False)
     process = subprocess.Popen(
         [sys.executable, "-m", "palette4d", "studio", str(sidecar)],
         env={"PATH": os.environ["PATH"], "HOME": str(home), "QT_QPA_PLATFORM": "offscreen"},

@@ -115,18 +115,22 @@ class Answer:
     ----------
     frame : int
     share : float
-        Share of the frame's pixels that are taken: they get at least a quarter of the change.
+        Share of the frame's pixels that are taken: they get at least a quarter of the change. Of a
+        hold: that it keeps.
     notes : tuple of Note
         What else the user should know.
+    kind : 'pick' or 'hold'
     """
 
     frame: int
     share: float
     notes: tuple[Note, ...] = ()
+    kind: Literal["pick", "hold"] = "pick"
 
     def lines(self) -> list[str]:
         """Return the answer for people."""
-        first = f"takes {percent(self.share)} of frame {self.frame}"
+        verb = "takes" if self.kind == "pick" else "keeps"
+        first = f"{verb} {percent(self.share)} of frame {self.frame}"
         return [first, *(line for note in self.notes for line in note.lines())]
 
 
@@ -139,17 +143,21 @@ def answer_to(grade: Grade, pick: Pick, clip: ClipOfPicks) -> Answer | None:
     picks = [other for other in others if other.kind == "pick"]
     notes: list[Note] = []
     if pick.kind == "hold":
-        costs = [_cost(view, other, pick) for other in picks]
-        notes = [note for cost in costs for note in cost or ()]
-        if picks and all(cost is None for cost in costs):
+        without = pick_edits.unpick(grade, clip, pick.id)
+        for other in picks:
+            if (cost := _cost(view, other, pick, without)) is not None:
+                notes += [_less(view, other, without), *cost]
+        if picks and not notes:
             notes = [Note("no pick takes less by it: hold a place that one takes", warns=True)]
     else:
         holds = [other for other in others if other.kind == "hold"]
         notes += _unmarked(view, pick, holds)
-        notes += (note for hold in holds for note in _cost(view, pick, hold) or ())
+        for hold in holds:
+            notes += _cost(view, pick, hold, pick_edits.unpick(grade, clip, hold.id)) or ()
         notes += _shared(view, pick, picks)
         notes += _also(view, pick)
-    return Answer(view.frame, float(view.taken(pick).mean()), tuple(notes))
+    kind: Literal["pick", "hold"] = "hold" if pick.kind == "hold" else "pick"
+    return Answer(view.frame, float(view.taken(pick).mean()), tuple(notes), kind)
 
 
 @dataclass(frozen=True)
@@ -296,9 +304,19 @@ def _unmarked(view: _View, pick: Pick, holds: Sequence[Pick]) -> Iterator[Note]:
         yield Note(f"does not take what you marked ({why})", there.place(left), warns=True)
 
 
-def _cost(view: _View, pick: Pick, hold: Pick) -> list[Note] | None:
-    """Report what a hold costs a pick's thing; None if the pick takes no less by it."""
-    without = pick_edits.unpick(view.grade, view.clip, hold.id)
+def _less(view: _View, pick: Pick, without: Grade) -> Note:
+    """Report what a pick takes with a hold and without it."""
+    now, before = (float(view.taken(pick, grade).mean()) for grade in (view.grade, without))
+    return Note(
+        f"{pick.id} takes {percent(now)} of frame {view.frame}, {percent(before)} without it"
+    )
+
+
+def _cost(view: _View, pick: Pick, hold: Pick, without: Grade) -> list[Note] | None:
+    """Report what a hold costs a pick's thing; None if the pick takes no less by it.
+
+    `without` is the grade without the hold.
+    """
     there = _View.of(view.grade, view.clip, pick.frame)
     lost, elsewhere = (
         replace(each, grade=without).change(without.pick(pick.id)) - each.change(pick) > TAKEN
