@@ -54,17 +54,25 @@ class Document:
     frame numbers; fractions are times between frames. A method that fails raises `Palette4dError`
     and changes nothing.
 
-    It is made from the members of a sidecar (docs/sidecar.md), or from a grade.
+    Parameters
+    ----------
+    content : mapping or Grade
+        The members of a sidecar (docs/sidecar.md), or a grade.
+    notes : iterable of str
+        Notes of the analysis about the palette.
+    report : mapping, optional
+        Figures of the analysis, as `palette4d analyze --json` prints them.
 
     Attributes
     ----------
-    grade, history : Grade and History
-        The palette and its edits as they are now, a value that never changes, and the steps to it.
+    grade : Grade
+        The palette and its edits, as they are now: a value that never changes.
+    history : History
+        The steps that led there.
     notes : tuple of str
-        Notes of the analysis about the palette.
+        As above.
     report : dict
-        Figures of the analysis, as `palette4d analyze --json` prints them; empty for a loaded
-        sidecar.
+        As above; empty for a loaded sidecar.
     """
 
     def __init__(
@@ -85,7 +93,15 @@ class Document:
 
     @classmethod
     def load(cls, path: PathLike, *, version: str = "") -> "Document":
-        """Load a sidecar (*.p4d.json), or a version in it; `SidecarError` if it is unusable."""
+        """Load a sidecar (*.p4d.json), or a version in it (`Document.version`).
+
+        Raises
+        ------
+        SidecarError
+            There is no such file, or it is unusable.
+        Palette4dError
+            There is no such version.
+        """
         data = sidecar.read_bytes(path)
         grade, history = _read(*sidecar.decoded(data, os.fspath(path)), Path(path))
         document = cls(grade)
@@ -108,7 +124,10 @@ class Document:
     # -------------------------------------------------------------------------------------- steps
 
     def apply(self, edit: Edit) -> None:
-        """Apply an edit as one step, without the versions that it makes: `undo` leaves those."""
+        """Apply an edit as one step, which `undo` reverts; an edit without change is no step.
+
+        Versions that it makes are no part of the step: they stay when it is undone.
+        """
         self._take(self.grade.after(edit))
 
     def _take(self, after: Grade) -> None:
@@ -171,16 +190,31 @@ class Document:
     ) -> Near:
         """Change the palette colour nearest to a given colour at a frame.
 
-        `near` is the visible colour, after the edits so far; `how` is the change, as in `adjust`.
         The stop at that time moves, or a vertex less than a frame step away, so that the colour at
-        the frame is exactly the new one. Otherwise a stop is added. A palette colour more than 0.25
-        away is refused unless `anyway`; the error names the colours that `near` is mixed from.
+        the frame is exactly the new one. Otherwise a stop is added.
+
+        Parameters
+        ----------
+        near : 3 floats or "#rrggbb"
+            The visible colour, after the edits so far.
+        frame : float
+            The time; within the clip.
+        anyway : bool
+            Edit the palette colour even if it is more than 0.25 away.
+        **how
+            The change, as in `adjust`: ``rgb=``, or others; ``any_value=``.
 
         Returns
         -------
         Near
             The palette colour and its distance; `handle` is the vertex or stop that now has the
             colour, or None after the change of a range.
+
+        Raises
+        ------
+        Palette4dError
+            The nearest palette colour is more than 0.25 away; the message names the palette colours
+            that `near` is mixed from.
         """
         after, nearest = handle_edits.set_near(self.grade, near, frame=frame, anyway=anyway, **how)
         self._take(after)
@@ -236,15 +270,22 @@ class Document:
         self._take(handle_edits.reset(self.grade, id))
 
     def set_ramp(self, ramp: str, id: str | None = None) -> None:
-        """Set the ramp from a vertex or stop to the next handle in time, or (None) the clip's ramp.
+        """Set the ramp from a vertex or stop to the next handle in time, or the clip's ramp.
 
-        "linear"; "smooth", a monotone cubic without overshoot; or "step", the handle's edit up to
-        the next handle. The clip's ramp is that of all handles without their own.
+        Parameters
+        ----------
+        ramp : {"linear", "smooth", "step"}
+            Linear; the monotone cubic without overshoot; the handle's edit up to the next handle.
+        id : str, optional
+            The vertex or stop; None: all handles without a ramp of their own.
         """
         self._take(handle_edits.set_ramp(self.grade, ramp, id))
 
     def lock(self, *ids: str, locked: bool = True) -> None:
-        """Lock vertices and stops (or unlock): moves of tracks and of the palette leave them."""
+        """Keep vertices and stops where they are: moves of tracks and of the palette leave them.
+
+        `locked` False lets them move again.
+        """
         self._take((handle_edits.lock if locked else handle_edits.unlock)(self.grade, *ids))
 
     def pick(
@@ -255,10 +296,10 @@ class Document:
         progress: Progress | None = None,
         **asked: Unpack[Asked],
     ) -> Pick:
-        """Change the colour of an object, and nothing else; return the pick with its path.
+        """Change a thing's colour into another one, and nothing else.
 
-        The object's colours are learned from the frame and from a few further frames of the clip:
-        the object is what is connected with the picked place (docs/grading.md).
+        Which colours are the thing's is learned from the frame and from a few further frames of the
+        clip: what is connected with the picked place is the thing (docs/grading.md).
 
         Parameters
         ----------
@@ -271,6 +312,16 @@ class Document:
         **asked
             The place, the change, when, and what it takes: the keywords of
             `palette4d.grade.pick_edits.Asked`.
+
+        Returns
+        -------
+        Pick
+            With its id and its path.
+
+        Raises
+        ------
+        Palette4dError
+            A value is out of range, or the clip does not fit.
         """
         after, made = pick_edits.pick(self.grade, self._clip(clip), frame, progress, **asked)
         self._take(after)
@@ -298,7 +349,11 @@ class Document:
         progress: Progress | None = None,
         **where: Unpack[Where],
     ) -> Pick:
-        """Give the colour of a pick or hold at another frame; it is followed again from both."""
+        """Say where the colour of a pick or hold is at another frame; it is followed again.
+
+        Between two given frames the path goes gradually from what follows the one to what follows
+        the other.
+        """
         own = self._clip(clip)
         self._take(pick_edits.correct_path(self.grade, own, id, frame, progress, **where))
         return self.grade.pick(id)
@@ -323,7 +378,10 @@ class Document:
         self._take(pick_edits.unpick(self.grade, self._clip(clip), *ids))
 
     def answer(self, id: str, clip: OfClip | None = None) -> answer.Answer | None:
-        """Return the share of its frame that a pick or hold takes, and notes; None without clip."""
+        """Return what a pick or hold takes of its frame, what else it does, and what would help.
+
+        None where the clip is not there.
+        """
         return answer.answer_to(self.grade, self.grade.pick(id), self._clip(clip))
 
     def pick_warnings(self, id: str, clip: OfClip | None = None) -> tuple[str, ...]:
@@ -345,7 +403,10 @@ class Document:
     def save_version(self, name: str) -> str | None:
         """Keep the active edits as a version. This is no step: `undo` leaves versions alone.
 
-        Returns the name that an older version of this name has now, such as "former NAME".
+        Returns
+        -------
+        str or None
+            The name that an older version of this name has now, such as "former NAME".
         """
         after, kept = versions.save_version(self.grade, name)
         self._take(after)
@@ -354,8 +415,12 @@ class Document:
     def use_version(self, name: str) -> str | None:
         """Make the edits of a version the active edits, as one step.
 
-        Active edits that no version holds are kept as a new version, which `undo` leaves. Returns
-        its name, such as "before NAME".
+        Active edits that no version holds are kept as a new version, which `undo` leaves.
+
+        Returns
+        -------
+        str or None
+            The name of the new version, such as "before NAME".
         """
         after, kept = versions.use_version(self.grade, name)
         self._take(after)
@@ -370,7 +435,19 @@ class Document:
     ) -> None:
         """Give a version a name that no version has, or a note; each is a step.
 
-        A note is one line of at most 300 characters; "" removes it. `grade.note` returns it.
+        Parameters
+        ----------
+        name : str
+            The version.
+        rename : str, optional
+            Its new name.
+        note : str, optional
+            One line of at most 300 characters; "" removes it. `grade.note` has it.
+
+        Raises
+        ------
+        Palette4dError
+            There is no such version, or another one has the new name.
         """
         if note is not None:
             self._take(versions.set_note(self.grade, name, note))
@@ -392,6 +469,8 @@ class Document:
 
         Parameters
         ----------
+        source : Document
+            The graded document.
         time : "relative" or float
             "relative": the first frame gets the look of the first frame, the last that of the last.
             A frame: all frames get the look of this frame of `source`.
@@ -402,6 +481,12 @@ class Document:
         -------
         Fit
             How near the result is to the copied grade; its text is for people.
+
+        Raises
+        ------
+        Palette4dError
+            The source has no edits, the frame is outside of its clip, or its colour space cannot be
+            converted.
         """
         after, fit = copying.copied(self.grade, source.grade, self._clip(clip), time)
         self._take(after)
@@ -410,31 +495,61 @@ class Document:
     # ----------------------------------------------------------------------------------- pictures
 
     def recolour(self, image: F32, frame: float, **how: Unpack[recolouring.Drawing]) -> F32:
-        """Recolour an image, (h, w, 3 or 4) float32, at a time: the same bits as the node.
+        """Recolour an image with the palette at a time: the same bits as the node.
 
-        Returns a new array; without edits it equals `image` bit by bit, and alpha never changes.
-        Frames outside the clip use its first or last frame. `how` has the keywords of
-        `palette4d.grade.recolouring.Drawing`.
+        Parameters
+        ----------
+        image : (h, w, 3 or 4) float32
+            Code values of the clip, 0..1 as a rule; a grade never changes alpha.
+        frame : float
+            The time; frames outside the clip use its first or last frame.
+        **how
+            The keywords of `palette4d.grade.recolouring.Drawing`.
+
+        Returns
+        -------
+        (h, w, 3 or 4) float32
+            A new array. Without edits it equals `image` bit by bit.
         """
         return recolouring.recolour(self.grade, image, frame, **how)
 
     def matte(self, image: F32, frame: float, show: str, **how: Unpack[recolouring.Matting]) -> F32:
-        """Return a matte of an image, (h, w) float32 in 0..1: the same values as the node's.
+        """Return a matte of an image: the same values as the node's.
 
-        `image` and `frame` as in `recolour`; colours are not multiplied by alpha, which is ignored.
-        `show`: "weight:ID", a soft key of a vertex or stop, which follows its colour through time;
-        "pick:ID", the matte of a pick or hold; or "outside", the colours outside the palette.
+        Parameters
+        ----------
+        image : (h, w, 3 or 4) float32
+            As in `recolour`; colours are not multiplied by alpha, and alpha is ignored.
+        show : str
+            "weight:ID", a soft key of a vertex or stop, which follows its colour through time;
+            "pick:ID", the matte of a pick or hold; or "outside", the colours outside the palette.
+        frame, **how
+            As in `recolour`.
+
+        Returns
+        -------
+        (h, w) float32
+            0..1.
         """
         return recolouring.matte(self.grade, image, frame, show, **how)
 
     def weights(
         self, image: F32, frame: float, *, space: Literal["input", "palette"] = "input"
     ) -> F32:
-        """Return the weights of the palette's n colours in each pixel, (h, w, n) float32.
+        """Return the weight of each palette colour in each pixel (mean value coordinates).
 
-        They are mean value coordinates in the order of ``palette(frame).ids``, and sum to 1. They
-        reproduce the pixel, or, outside the palette, its nearest point. NaN for pixels that are not
-        finite. `image` as in `matte`.
+        Parameters
+        ----------
+        image : (h, w, 3 or 4) float32
+            As in `recolour`; colours are not multiplied by alpha, and alpha is ignored.
+        frame, space
+            As in `recolour`.
+
+        Returns
+        -------
+        (h, w, n) float32
+            Weights in the order of ``palette(frame).ids``; they sum to 1. They reproduce the pixel,
+            or, outside the palette, its nearest point. NaN for pixels that are not finite.
         """
         return recolouring.weights(self.grade, image, frame, space=space)
 
@@ -464,9 +579,19 @@ class Document:
         of both into the file and the document. If both changed one handle differently, it raises an
         error and writes nothing.
 
-        With `path`, another file is written. `on_edits` says what to do with edits in that file,
-        which would be lost. "keep" takes them over; if the palette differs, it copies the grade and
-        keeps the old file under another name; `notes` says so.
+        Parameters
+        ----------
+        path : path, optional
+            A file other than the loaded file.
+        on_edits : {"refuse", "keep", "drop"}
+            What to do with edits in that file, which would be lost. "keep" takes them over. If the
+            palette differs, it copies the grade and keeps the old file under another name; `notes`
+            says so.
+
+        Raises
+        ------
+        Palette4dError
+            Edits would be lost, or the file cannot be written.
         """
         if path is None and self.path is None:
             raise Palette4dError(
