@@ -58,7 +58,7 @@ replace its DLLs by your own. You get the sources of
   FFmpeg, x264, x265 and PyAV   https://github.com/PyAV-Org/pyav-ffmpeg, with the versions and the
                                 commands of the build, and https://github.com/PyAV-Org/PyAV
   Qt and PySide                 https://download.qt.io/official_releases/QtForPython/pyside6
-  all others                    https://pypi.org, by the names and versions below
+  all others                    PyPI, the Python Package Index, by the names and versions below
 
 Whoever passes this folder on must let people have the same sources.
 
