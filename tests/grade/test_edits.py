@@ -1,6 +1,7 @@
 """Edits as values: applied, taken back, and merged with another writer's."""
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -127,6 +128,8 @@ def test_steps_are_the_same_after_their_json() -> None:
     after["version", "warm"] = dict(after)
     both = (difference(before, after, "all").undoable(), difference(after, before, "nothing"))
     assert history_of(written(*both), "name") == (both, ())
+    unread = (replace(both[0], unread=True), both[1])
+    assert history_of(written(*unread), "name") == (unread, ())
 
 
 def test_old_steps_are_forgotten() -> None:

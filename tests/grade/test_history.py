@@ -139,6 +139,7 @@ def test_the_history_stays_small(plain: Path) -> None:
         {"done": [{"step": "x", "changes": [["pick", "p1", None, PICK | {"fade": "5"}]]}]},
         {"undone": [{"step": 3, "changes": [["lock", "v1", None, True]]}]},
         {"undone": [{"step": "x", "changes": [["lock", "v1", None, 3]]}]},
+        {"done": [{"step": "x", "changes": [["lock", "v1", None, True]], "unread": 1}]},
         {"undone": [{"step": "x", "changes": [["version", "v1", None, 3]]}]},
     ],
 )

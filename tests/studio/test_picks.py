@@ -49,6 +49,12 @@ def picks(window: Window) -> tuple[Pick, ...]:
     return window.session.document.grade.picks
 
 
+def history(window: Window) -> list[str]:
+    """The rows of the list of steps."""
+    rows = window.history.list
+    return [rows.item(row).text() for row in range(rows.count())]
+
+
 def pick(qtbot: Any, window: Window, x: int, y: int) -> None:
     """Click a pixel and give it a new colour."""
     qtbot.mouseClick(window.viewer, LEFT, pos=at(window, x, y).toPoint())
@@ -340,7 +346,7 @@ def test_a_change_while_a_hold_is_learned_is_not_lost(qtbot: Any, opened: Window
 
 
 def test_what_is_released_is_saved_before_it_is_followed(
-    qtbot: Any, opened: Window, sidecar: Path
+    qtbot: Any, opened: Window, sidecar: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     twin = Path(shutil.copy(sidecar, sidecar.with_name("twin.p4d.json")))
     session = opened.session
@@ -353,14 +359,39 @@ def test_what_is_released_is_saved_before_it_is_followed(
     (found,) = palette4d.load(sidecar).grade.picks  # what a kill now would leave
     assert found.to == NEW
     assert found.path == ()
+    assert [step.unread for step in palette4d.load(sidecar).history.done] == [True]
+    assert main(["edit", str(sidecar), "history"]) == 0
+    assert all(texts.UNREAD_STEP in said for said in (history(opened)[1], capsys.readouterr().out))
     assert session.saved
     go_on()
     assert not session.saved
     session.tick(2 * LATER)
+    assert texts.UNREAD_STEP not in history(opened)[1]
     frame = str(session.frame)
     words = ["pick", "--pixel", "40,30", "--frame", frame, "--to", *map(str, NEW)]
     assert main(["edit", str(twin), *words]) == 0
     assert sidecar.read_bytes() == twin.read_bytes()
+
+
+def test_a_pick_that_is_merged_with_other_edits_while_it_is_followed(
+    qtbot: Any, opened: Window, sidecar: Path
+) -> None:
+    session = opened.session
+    qtbot.mouseClick(opened.viewer, LEFT, pos=at(opened, 40, 30).toPoint())
+    go_on = waiting_calls(session, qtbot)
+    opened.inspector.set_colour(np.array(NEW))
+    session.edit(lambda document: document.set_ramp("smooth"))
+    theirs = palette4d.load(sidecar)
+    theirs.lock("v1")
+    theirs.save()
+    assert session.save()
+    assert [step.unread for step in palette4d.load(sidecar).history.done] == [False, True]
+    go_on()
+    assert session.save()
+    assert not any(step.unread for step in palette4d.load(sidecar).history.done)
+    assert not session.unfollowed
+    (found,) = picks(opened)
+    assert found.path
 
 
 def test_a_pick_that_is_undone_or_kept_while_it_is_followed(qtbot: Any, opened: Window) -> None:

@@ -111,8 +111,9 @@ def run_history(args: argparse.Namespace) -> int:
         print(json.dumps(labels))
         return 0
     for number, step in enumerate((*done, *reversed(undone)), 1):
+        unread = "  (not followed yet)" if step.unread else ""
         note = "" if number <= len(done) else "  (undone)"
-        print(f"{number:>4}  {step.label}{note}")
+        print(f"{number:>4}  {step.label}{unread}{note}")
     if not done and not undone:
         print("no steps")
     return 0

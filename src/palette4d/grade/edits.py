@@ -122,10 +122,14 @@ class Change:
 
 @dataclass(frozen=True)
 class Edit:
-    """One undoable step: at most one change for each key, and a label: "set v14 to #e66b9e"."""
+    """One undoable step: at most one change for each key, and a label: "set v14 to #e66b9e".
+
+    `unread`: its picks are neither learned nor followed yet (`grade.later`).
+    """
 
     changes: tuple[Change, ...]
     label: str = ""
+    unread: bool = False
 
     def inverse(self) -> "Edit":
         """Return the edit that reverts this edit."""

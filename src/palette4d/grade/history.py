@@ -1,6 +1,6 @@
 """The steps of a document: taken back, applied again, and merged with those of another program."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from palette4d.common.errors import Palette4dError
 from palette4d.grade import edits
@@ -65,6 +65,8 @@ def merged(
     before = file.history.done
     new = history.done[len(before) :] if history.done[: len(before)] == before else ()
     label = new[0].label if len(new) == 1 else "edits of two programs"
-    if (step := edits.difference(other.state, state, label).undoable()).changes:
+    step = edits.difference(other.state, state, label).undoable()
+    step = replace(step, unread=any(each.unread for each in new))
+    if step.changes:
         steps = History((*steps.done, step), history.undone)
     return other.with_mattes(own.mattes).with_state(state), steps

@@ -2,8 +2,8 @@
 
 An edit with `Unread` for its clip leaves out what only the clip can tell: the path, and the matte.
 The same edit with the clip gives both. `completed` puts them into the step that was made at once,
-whatever was done, undone or kept as a version since. Until then the step's label says so, also to
-the next program: `unread` finds the steps of one that ended too early.
+whatever was done, undone or kept as a version since. Until then the step is `Edit.unread`, also to
+the next program: `unread` yields the steps of one that ended too early.
 """
 
 import dataclasses
@@ -25,8 +25,6 @@ from palette4d.grade.picks import PathKey, Pick
 Readings = tuple[tuple[Pick, Pick], ...]
 #: What a path and a matte depend on: a pick that differs in one of these is another pick.
 _INPUTS = ("kind", "frame", "rgb", "pixel", "box", "areas", "whole_hue")
-#: Ends the label of a step whose clip is not read yet.
-NOT_YET = " (not followed yet)"
 
 
 class Unread(ClipOfPicks):
@@ -64,17 +62,7 @@ class Unread(ClipOfPicks):
 def as_unread(history: History) -> History:
     """Return the history whose last step says that its clip is not read yet."""
     *earlier, step = history.done
-    return replace(history, done=(*earlier, replace(step, label=step.label + NOT_YET)))
-
-
-def as_read(step: Edit) -> Edit:
-    """Return a step that does not say so."""
-    return replace(step, label=step.label.removesuffix(NOT_YET))
-
-
-def is_unread(step: Edit) -> bool:
-    """Return whether a step says that its clip is not read yet."""
-    return step.label.endswith(NOT_YET)
+    return replace(history, done=(*earlier, replace(step, unread=True)))
 
 
 def unread(grade: Grade, history: History) -> Iterator[tuple[Grade, Grade, Edit]]:
@@ -82,7 +70,7 @@ def unread(grade: Grade, history: History) -> Iterator[tuple[Grade, Grade, Edit]
     waiting, after = [], grade
     for step in reversed(history.done):
         before = grade.with_state(step.inverse().apply(after.state))
-        if is_unread(step):
+        if step.unread:
             waiting.append((before, after, step))
         after = before
     return reversed(waiting)
@@ -91,7 +79,7 @@ def unread(grade: Grade, history: History) -> Iterator[tuple[Grade, Grade, Edit]
 def do_again(document: Document, step: Edit, clip: OfClip, progress: Progress | None) -> None:
     """Do a step whose clip was not read, and read it."""
     were = {change.id: change.before for change in step.changes if change.kind == "pick"}
-    with document.one_step(as_read(step).label):
+    with document.one_step(step.label):
         document.grade = document.grade.after(step)
         for pick in readers(step, document.grade):
             new = were.get(pick.id, pick) is None
@@ -134,10 +122,14 @@ def completed(
     index = max((k for k, each in enumerate(line) if _same(each, step)), default=None)
     is_done = index is None or index < done
     now = (with_readings if is_done else _versions)(grade.state, readings)
-    if index is None:
-        return grade.with_state(now), history.with_step(
-            edits.difference(grade.state, now, like.label).undoable()
-        )
+    if index is None:  # merged with other steps, when another program wrote the file
+        keys = {change.key for change in step.changes}
+        done_now = [
+            replace(each, unread=each.unread and not keys <= {c.key for c in each.changes})
+            for each in history.done
+        ]
+        own = edits.difference(grade.state, now, like.label).undoable()
+        return grade.with_state(now), replace(history, done=tuple(done_now)).with_step(own)
     before: State = grade.state
     for each in reversed(line[index:done]):
         before = each.inverse().apply(before)
@@ -149,7 +141,7 @@ def completed(
         after = with_readings(before, readings)
         line[k] = replace(line[k], changes=_changes(state, after, order))
         state = after
-    line[index] = replace(line[index], label=like.label)
+    line[index] = replace(line[index], label=like.label, unread=False)
     kept = [each for each in line[:done] if each.changes]
     undone = [each for each in line[done:] if each.changes]
     return grade.with_state(now, grade.label), History(tuple(kept), tuple(reversed(undone)))

@@ -231,7 +231,7 @@ def _step_fields(step: Edit, vertex_ids: Iterable[str]) -> Fields:
     changes = [
         [c.kind, c.id, plain(c.kind, c.before), plain(c.kind, c.after)] for c in step.changes
     ]
-    return {"step": step.label, "changes": changes}
+    return {"step": step.label, "changes": changes, **({"unread": True} if step.unread else {})}
 
 
 def _step(fields: Any) -> Edit:
@@ -242,7 +242,7 @@ def _step(fields: Any) -> Edit:
         if not isinstance(id_, str) or before == after:
             raise ValueError(f"the change {kind!r} of {id_!r}")
         changes.append(Change(kind, id_, before, after))
-    label = fields["step"]
-    if not isinstance(label, str) or not changes:
+    label, unread = fields["step"], fields.get("unread", False)
+    if not isinstance(label, str) or not isinstance(unread, bool) or not changes:
         raise ValueError(f"the step {label!r}")
-    return Edit(tuple(changes), label)
+    return Edit(tuple(changes), label, unread)

@@ -60,7 +60,8 @@ class Job:
             grade.with_state(later.with_readings(grade.state, readings)).with_mattes(done.mattes)
             for grade in (self.before, self.after)
         )
-        step = edits.difference(before.state, after.state, self.step.label).undoable()
+        changes = edits.difference(before.state, after.state).undoable().changes
+        step = replace(self.step, changes=changes)
         return replace(self, before=before, after=after, step=step)
 
 
@@ -126,7 +127,7 @@ class Follower:
         readings = later.readings_of(done.grade, job.after)
         self._jobs.popleft()
         self._jobs = deque(each.with_readings(readings, done.grade) for each in self._jobs)
-        like = done.history.done[-1] if done.history.done else later.as_read(job.step)
+        like = done.history.done[-1] if done.history.done else job.step
         self._session.complete((job.step, like), readings, done.grade.mattes)
         self._session.say(job.text)
         self._next()

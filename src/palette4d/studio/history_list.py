@@ -43,8 +43,10 @@ class History(QWidget):
         done = 0
         if document is not None:
             steps = (*document.history.done, *reversed(document.history.undone))
-            named = ((with_row_names(document.grade, edit.label), edit) for edit in steps)
-            rows = [(texts.BEGINNING, None), *named]
+            rows = [(texts.BEGINNING, None)]
+            for step in steps:
+                text = with_row_names(document.grade, step.label)
+                rows.append((f"{text}  {texts.UNREAD_STEP}" if step.unread else text, step))
             done = len(document.history.done)
         self.list.clear()
         for k, (text, edit) in enumerate(rows):

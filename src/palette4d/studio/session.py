@@ -253,19 +253,20 @@ class Session(Drafts):
             return
         before, made = document.grade, list[T]()
 
-        def at_once(document: Document) -> None:
+        def at_once(document: Document) -> Step | None:
             first = None if clip is None else unread or Unread()
             made.append(operation(document, first, None))
+            changes = edits.difference(before.state, document.grade.state).undoable().changes
+            if clip is None or not changes or document.history.done[-1].changes != changes:
+                return None
+            document.history = later.as_unread(document.history)
+            return document.history.done[-1]
 
-        self.edit(at_once, text)
+        step = self.edit(at_once, text)
         if not made:
             return
         then(made[0])
-        done = document.history.done
-        step = edits.difference(before.state, document.grade.state).undoable()
-        if clip is not None and step.changes and done[-1].changes == step.changes:
-            document.history = later.as_unread(document.history)
-            step = document.history.done[-1]
+        if clip is not None and step is not None:
             self._follower.add(Job(operation, clip.source, text, before, document.grade, step))
 
     @property
@@ -279,7 +280,7 @@ class Session(Drafts):
         document = self._document
         if document is None or self.clip is None or self.following:
             return []
-        left = [step for step in document.history.done if later.is_unread(step)]
+        left = [step for step in document.history.done if step.unread]
         return sorted({pick.id for step in left for pick in later.readers(step, document.grade)})
 
     def follow(self) -> None:
@@ -288,7 +289,7 @@ class Session(Drafts):
         if document is None or clip is None:
             return
         for before, after, step in later.unread(document.grade, document.history):
-            text = texts.FOLLOWED.format(step=later.as_read(step).label)
+            text = texts.FOLLOWED.format(step=step.label)
             self._follower.add(Job(None, clip.source, text, before, after, step))
 
     def complete(

@@ -471,7 +471,8 @@ class TimelineView(QWidget):
             if start < self.session.frame < end:
                 self.add_stop(content.edge_ids[edge], float(self.session.frame))
                 return
-        self.session.say(texts.NO_STOP_HERE.format(edge=""), "warning")
+        selected = self._row(self.session.selection[0])
+        self.session.say(texts.NO_STOP_HERE.format(row=selected), "warning")
 
     # -------------------------------------------------------------------------------- the keyboard
 
