@@ -31,7 +31,7 @@ class Conversion:
         backward = [name for _, name in reversed(steps)]
         self.text = "\n".join(
             [
-                *([_SAMPLED] if self.samples else []),
+                *([_core.kernel_text("sampled")] if self.samples else []),
                 *self._functions,
                 _chain("p4d_to_palette", forward),
                 _chain("p4d_to_clip", backward),
@@ -72,24 +72,6 @@ def _position(all_of: Sequence[float], part: Sequence[float]) -> int:
     """Return where a run of numbers begins, or -1."""
     ends = range(len(all_of) - len(part) + 1)
     return next((i for i in ends if list(all_of[i : i + len(part)]) == list(part)), -1)
-
-
-_SAMPLED = """\
-P4D_FN float p4d_sampled(float x, int from, int to, int count) {
-    int low = 0, high = count - 1, n;
-    float a, b;
-    while (high - low > 1) {
-        n = (low + high) / 2;
-        if (P4D_C(from + n) <= x) {
-            low = n;
-        } else {
-            high = n;
-        }
-    }
-    a = P4D_C(to + low);
-    b = (P4D_C(to + high) - a) / (P4D_C(from + high) - P4D_C(from + low));
-    return a + (x - P4D_C(from + low)) * b;
-}"""
 
 
 def _chain(name: str, functions: Iterable[str]) -> str:

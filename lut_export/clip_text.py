@@ -94,7 +94,7 @@ def clip_text(
     conversion: list[str] = []
     if sidecar.conversion is not None and not sidecar.conversion.steps.identity:
         steps = Conversion(sidecar.conversion.steps)
-        defines += ["#define P4D_CONVERTS", "#define P4D_C(i) p4d_curves[i]"]
+        defines += ["#define P4D_CONVERTS", "#define P4D_CURVES", "#define P4D_C(i) p4d_curves[i]"]
         if steps.samples:
             arrays["p4d_curves"] = steps.samples
         conversion = [steps.text]

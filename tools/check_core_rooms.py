@@ -17,7 +17,7 @@ ROOMS: dict[str, set[str]] = {
     "core/recolour": {"simd", "threads", "model", "convert"},
     "core/output": {"simd", "threads", "model", "convert", "recolour"},
     "core/fit": {"simd", "threads", "model"},
-    "gpu": {"gpu/kernel", "simd", "model", "recolour", "output"},
+    "gpu": {"gpu/kernel", "simd", "model", "convert", "recolour", "output"},
     "node": {"model", "convert", "sidecar", "recolour", "output", "gpu"},
 }
 INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"', re.MULTILINE)

@@ -26,7 +26,17 @@ OPTIONS = (
 
 def source() -> str:
     """The kernel in CUDA's dialect, as CMake puts it together."""
-    parts = ("layout", "face", "palette", "display", "grids", "picks", "pixel")
+    parts = [
+        "layout",
+        "face",
+        "palette",
+        "display",
+        "grids",
+        "picks",
+        "sampled",
+        "convert",
+        "pixel",
+    ]
     frame = "".join((KERNEL / f"{part}.inc").read_text(encoding="utf-8") for part in parts)
     return (KERNEL / "cuda.cu").read_text(encoding="utf-8").replace("@P4D_FRAME@", frame)
 

@@ -16,9 +16,13 @@ namespace {
 
 std::string text(const std::string& part) {
     using namespace palette4d::gpu;
-    static const std::map<std::string, const char* (*)()> parts = {
-        {"frame", &frame_text},         {"clip", &clip_text},     {"clip_picks", &clip_picks_text},
-        {"clip_main", &clip_main_text}, {"opencl", &opencl_text}, {"metal", &metal_text}};
+    static const std::map<std::string, const char* (*)()> parts = {{"frame", &frame_text},
+                                                                   {"clip", &clip_text},
+                                                                   {"clip_picks", &clip_picks_text},
+                                                                   {"clip_main", &clip_main_text},
+                                                                   {"sampled", &sampled_text},
+                                                                   {"opencl", &opencl_text},
+                                                                   {"metal", &metal_text}};
     const auto found = parts.find(part);
     if (found == parts.end()) {
         throw py::value_error("part: found '" + part + "'");
@@ -28,7 +32,8 @@ std::string text(const std::string& part) {
 
 py::tuple table(const std::shared_ptr<const Recolourer>& map, const std::string& output,
                 double strength, double keep_lightness, const Vec3& lightness, double mix,
-                bool matte_in_alpha, double outside_at, bool premultiplied) {
+                bool matte_in_alpha, double outside_at, bool premultiplied,
+                const ColourConversion* conversion) {
     static const std::map<std::string, Output> outputs = {{"recoloured", Output::kRecoloured},
                                                           {"weight", Output::kWeight},
                                                           {"outside", Output::kOutside},
@@ -42,6 +47,9 @@ py::tuple table(const std::shared_ptr<const Recolourer>& map, const std::string&
     drawing.options = {found->second,  matte_in_alpha, outside_at, strength,
                        keep_lightness, lightness,      mix,        0};
     (drawing.options.is_matte() ? drawing.reader : drawing.edit) = map;
+    if (conversion && !conversion->identity()) {
+        drawing.conversion = {std::shared_ptr<void>(), conversion};  // Python owns it
+    }
     const std::string problem = gpu::lacks(drawing);
     if (!problem.empty()) throw py::value_error("the kernel cannot draw " + problem);
     const gpu::FrameTable made = gpu::frame_table(drawing, premultiplied);
@@ -56,11 +64,13 @@ py::tuple table(const std::shared_ptr<const Recolourer>& map, const std::string&
 void bind_gpu(py::module_& module) {
     module.def(
         "kernel_text", &text, py::arg("part"),
-        "The GPU kernel's text: 'frame', 'clip', 'clip_picks', 'clip_main', 'opencl' or 'metal'.");
+        "The GPU kernel's text: 'frame', 'clip', 'clip_picks', 'clip_main', 'sampled', 'opencl' or "
+        "'metal'.");
     module.def("kernel_table", &table, py::arg("map").none(false), py::kw_only(),
                py::arg("output") = "recoloured", py::arg("strength") = 1.0,
                py::arg("keep_lightness") = 0.0, py::arg("lightness") = Vec3{0, 0, 0},
                py::arg("mix") = 1.0, py::arg("matte_in_alpha") = false,
                py::arg("outside_at") = 0.05, py::arg("premultiplied") = false,
+               py::arg("conversion") = py::none(),
                "What the kernel reads for a frame: the table and the grids, float32.");
 }

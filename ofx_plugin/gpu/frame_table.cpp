@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "gpu/convert_table.hpp"
 #include "gpu/kernel/layout.inc"
 #include "model/vec3.hpp"
 #include "recolour/recolour.hpp"
@@ -222,11 +223,15 @@ std::size_t table_size(const Recolourer& map) {
 std::string lacks(const Drawing& drawing) {
     const DrawingOptions& options = drawing.options;
     if (options.output == Output::kPalette) return "the palette in the picture";
-    if (drawing.conversion) return "a picture in another colour space than the palette";
     const Recolourer* const map = map_of(drawing);
     if (!map) return "";
     if (!fits(*map)) return "a palette beyond single precision";
-    if (table_size(*map) > kMostTable) return "a palette of that many handles";
+    std::size_t size = table_size(*map);
+    if (drawing.conversion) {
+        if (!fits(*drawing.conversion)) return "a conversion beyond single precision";
+        size += table_size(*drawing.conversion);
+    }
+    if (size > kMostTable) return "a palette of that many handles";
     const bool cleans = !options.is_matte() || options.output == Output::kPick;
     if (cleans && options.clean_up > 0 && !map->picks().picks.empty()) {
         return "the clean-up of picks";
@@ -276,6 +281,7 @@ FrameTable frame_table(const Drawing& drawing, bool premultiplied) {
         }
     }
     add_picks(*map, result);
+    if (drawing.conversion) add_conversion(*drawing.conversion, result);
     return result;
 }
 

@@ -9,6 +9,8 @@ const char* frame_text();
 const char* clip_text();
 /// After that, what its picks and holds do.
 const char* clip_picks_text();
+/// A curve by its samples, for a conversion's functions.
+const char* sampled_text();
 /// After both, and the conversion's functions: a colour of the picture at a frame.
 const char* clip_main_text();
 

@@ -349,7 +349,7 @@ def luminance_weights(encoding: str) -> list[float]:
     """Return the weights of red, green and blue by an encoding's name; Rec.709's if unknown."""
 
 def kernel_text(part: str) -> str:
-    """Return the GPU kernel's text: 'frame', 'clip', 'clip_picks', 'clip_main', 'opencl'."""
+    """Return a part of the GPU kernel's text, or 'opencl' or 'metal' for all of one's dialect."""
 
 def kernel_table(
     map: Recolourer,
@@ -362,6 +362,7 @@ def kernel_table(
     matte_in_alpha: bool = False,
     outside_at: float = 0.05,
     premultiplied: bool = False,
+    conversion: ColourConversion | None = None,
 ) -> tuple[F32, F32]:
     """Return what the kernel reads for a frame: the table and the grids, both flat."""
 

@@ -37,6 +37,17 @@ long every(long step) {
     return std::getenv("PALETTE4D_FEW_ROUNDS") ? 2 * step + 1 : step;
 }
 
+/// Scene-linear light with other primaries to a log in which the palette's box lies.
+constexpr const char* kConversion = R"("encoding": "ACEScct", "conversion": {
+  "input_space": "ACEScg", "config": "test.ocio", "error": 0, "steps": [
+    {"kind": "matrix", "matrix": [[0.9, 0.1, 0], [0.05, 0.9, 0.05], [0, 0.1, 0.9]],
+     "offset": [0, 0, 0]},
+    {"kind": "log", "direction": "forward", "base": 2,
+     "log_slope": [0.0570776, 0.0570776, 0.0570776],
+     "log_offset": [0.5547945, 0.5547945, 0.5547945], "linear_slope": [1, 1, 1],
+     "linear_offset": [0, 0, 0], "start": [0.0078125, 0.0078125, 0.0078125],
+     "below": [10.5402, 10.5402, 10.5402]}]})";
+
 void figure(const std::string& what) { std::cout << "      " << what << std::endl; }
 
 const std::string& bundle() { return g_bundle; }
@@ -89,6 +100,11 @@ std::string sidecar_text(bool edited) {
     }
     json << R"(}, "extra": {}})";
     return json.str();
+}
+
+std::string with_conversion(std::string sidecar) {
+    const std::string from = R"("encoding": "linear")";
+    return sidecar.replace(sidecar.find(from), from.size(), kConversion);
 }
 
 std::string text_with_picks(bool edited) {

@@ -62,8 +62,10 @@ std::string write(const std::string& name, const std::string& text);
 std::string sidecar_text(bool edited = true);
 /// The same with two picks, p1 and p4, and a hold, p3.
 std::string text_with_picks(bool edited = true);
-/// The same, written under a name; its path.
+/// Without picks, written under a name; its path.
 std::string sidecar(const std::string& name = "clip.p4d.json", bool edited = true);
+/// A sidecar's text, with scene-linear light in its clip and a log's code values in its palette.
+std::string with_conversion(std::string sidecar);
 
 /// Colours inside and outside the palette, below 0 and above 1; for float, NaN and infinities too.
 void fill(strict::Picture& picture, unsigned seed = 1, bool odd_values = true);

@@ -12,29 +12,9 @@ using palette4d::Vec3;
 
 namespace {
 
-/// Scene-linear light with other primaries to a log in which the palette's box lies.
-constexpr const char* kConversion = R"("encoding": "ACEScct", "conversion": {
-  "input_space": "ACEScg", "config": "test.ocio", "error": 0, "steps": [
-    {"kind": "matrix", "matrix": [[0.9, 0.1, 0], [0.05, 0.9, 0.05], [0, 0.1, 0.9]],
-     "offset": [0, 0, 0]},
-    {"kind": "log", "direction": "forward", "base": 2,
-     "log_slope": [0.0570776, 0.0570776, 0.0570776],
-     "log_offset": [0.5547945, 0.5547945, 0.5547945], "linear_slope": [1, 1, 1],
-     "linear_offset": [0, 0, 0], "start": [0.0078125, 0.0078125, 0.0078125],
-     "below": [10.5402, 10.5402, 10.5402]}]})";
-
-std::string with_conversion(bool edited = true) {
-    std::string text = sidecar_text(edited);
-    const auto put = [&](const std::string& from, const std::string& to) {
-        text.replace(text.find(from), from.size(), to);
-    };
-    put(R"("encoding": "linear")", kConversion);
-    return text;
-}
-
 struct ConvertingNode : Ready {
     explicit ConvertingNode(bool edited = true)
-        : Ready(write("light.p4d.json", with_conversion(edited))) {}
+        : Ready(write("light.p4d.json", with_conversion(sidecar_text(edited)))) {}
 };
 
 Layout layout_of(Depth depth, int channels, const char* premultiplication) {

@@ -168,6 +168,39 @@ TEST(gpu_mattes_lightness_and_mix) {
     }
 }
 
+TEST(gpu_pictures_in_another_colour_space) {
+    for (const auto& gpu : gpus()) {
+        Both node(*gpu, write("light.p4d.json", with_conversion(text_with_picks())));
+        node.set("cleanUp", 0.0);
+        for (const char* alpha : {kOfxImageUnPreMultiplied, kOfxImagePreMultiplied}) {
+            Layout layout;
+            layout.bounds = rect(-9, 4, 78, 60);
+            layout.premultiplication = alpha;
+            const Picture source = source_of(layout);
+            for (const int space : {0, 1}) {
+                node.set("pictureIn", space);
+                for (const int output : {0, 1, 3, 4}) {
+                    node.set("output", output);
+                    node.compare(source, layout.bounds, true);
+                }
+                node.set("output", 0);
+                CHECK(node.draw(&source, layout, layout.bounds, gpu.get()) !=
+                      source.pixels(layout.bounds));
+            }
+            node.set("strength", 0.4);
+            node.set("mix", 0.5);
+            node.set("keepLightness", 0.5);
+            node.compare(source, layout.bounds, true);
+            for (const char* name : {"strength", "mix"}) node.set(name, 1.0);
+            node.set("keepLightness", 0.0);
+        }
+        Both plain(*gpu, write("plain.p4d.json", with_conversion(sidecar_text(false))));
+        const Picture source = source_of({});
+        CHECK(plain.draw(&source, {}, Layout{}.bounds, gpu.get()) ==
+              source.pixels(Layout{}.bounds));
+    }
+}
+
 TEST(gpu_what_the_kernel_lacks_is_drawn_on_the_processor) {
     for (const auto& gpu : gpus()) {
         Both node(*gpu, write("picks.p4d.json", text_with_picks()));

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import importlib.util
+import json
 from pathlib import Path
 from types import ModuleType
 
@@ -22,8 +23,9 @@ from parity.cases import (
     same_bits,
     times_of,
 )
-from parity.implementations import CORE, REFERENCE, Core
+from parity.implementations import CORE, REFERENCE, Core, Document
 from parity.kernel import KERNEL, draw, draw_by_metal
+from parity.test_conversions import golden
 
 from palette4d import _core
 
@@ -160,6 +162,87 @@ def test_lightness_is_kept_and_the_source_mixed_in_as_in_the_core(premultiplied:
     found = draw(image, recolourer, **options)
     np.testing.assert_allclose(found, expected, **FAST_TOLERANCE)
     assert (found[1:] != image[1:]).any()
+
+
+def light(count: int = 6000) -> NDArray[np.float32]:
+    """RGBA from deep shadows to highlights, below 0, and what is no colour."""
+    random = np.random.default_rng(8)
+    pixels = np.exp2(random.uniform(-12, 4, (count, 1))) * random.uniform(0.1, 1, (count, 4))
+    pixels[::3, :3] = random.uniform(-0.3, 1.3, pixels[::3, :3].shape)
+    pixels[:, 3] = random.uniform(0.2, 1, count)
+    pixels[:12, 0] = np.repeat([np.nan, np.inf, -np.inf, 1e30], 3)
+    pixels[12:18, 3] = np.repeat([0, np.nan], 3)
+    return pixels[None].astype(np.float32)
+
+
+def curves() -> list[Document]:
+    """Steps with three sampled curves there, and one back."""
+    x = np.linspace(-0.4, 1.5, 4096)
+    made = [np.sinh(2 * x) / 4 + 0.1, np.expm1(x), x**3 + 0.3 * x]
+    samples = [{"x": x.tolist(), "y": y.tolist()} for y in made]
+    return [
+        {"kind": "curve", "direction": "forward", "curves": samples},
+        {"kind": "matrix", "matrix": [[0.8, 0.3, -0.1], [0, 1, 0], [-0.05, 0.2, 0.85]],
+         "offset": [0.01, 0, -0.02]},
+        {"kind": "curve", "direction": "inverse", "curves": [samples[1]]},
+    ]  # fmt: skip
+
+
+CONVERSIONS = {
+    "scene_linear": golden("scene_linear")["clip"]["conversion"]["steps"],
+    "every_step": golden("every_step")["clip"]["conversion"]["steps"],
+    "curves": curves(),
+}
+
+
+@pytest.mark.parametrize("premultiplied", [False, True])
+@pytest.mark.parametrize("output", ["recoloured", "weight", "outside", "pick"])
+@pytest.mark.parametrize("name", CONVERSIONS)
+def test_pictures_in_another_colour_space(name: str, output: str, premultiplied: bool) -> None:
+    conversion = _core.ColourConversion(json.dumps(CONVERSIONS[name]))
+    image = light()
+    if name != "scene_linear":  # where their logs and curves are
+        usual = np.abs(image) < 20
+        image[usual] = np.tanh(image[usual])
+    if premultiplied:
+        image[..., :3] *= image[..., 3:]
+    if output == "recoloured":
+        recolourer = Core("single").recolourer(DOCUMENTS["still-learned"], 7.0)
+    else:
+        recolourer = reader("still-learned", 7.0, output)
+    options = {"output": output, "premultiplied": premultiplied, "conversion": conversion}
+    expected = _core.draw(image, map=recolourer, clean_up=0.0, **options)
+    found = draw(image, recolourer, **options)
+    odd = ~np.isfinite(image[..., :3]).all(axis=-1)
+    if premultiplied:
+        odd |= (image[..., 3] == 0) | np.isnan(image[..., 3])
+    assert 8 < odd.sum() < 20
+    assert same_bits(found, expected)[odd].all()
+    far = (np.abs(image) > 1e6).any(axis=-1)
+    expected, found, image = (a[~odd & ~far].astype(float) for a in (expected, found, image))
+    if output != "recoloured":
+        np.testing.assert_allclose(found, expected, atol=10 * GOAL)
+        assert np.ptp(expected[:, :3]) > 0.1
+        return
+    untouched = (expected[:, :3] == image[:, :3]).all(axis=-1)
+    assert 10 < untouched.sum() < len(image)
+    assert (found[untouched, :3] == image[untouched, :3]).all()
+    alpha = expected[:, 3:] if premultiplied else 1
+    found_there, there = (conversion.to_palette(a[:, :3] / alpha) for a in (found, expected))
+    # A matrix mixes channels: the largest one sets the scale.
+    size = np.maximum(np.abs(there).max(axis=1, keepdims=True), 1)
+    off = np.abs(found_there - there) / size
+    assert off.max() < GOAL
+    np.testing.assert_array_equal(found[:, 3], image[:, 3])
+
+
+def test_the_kernel_says_which_conversions_it_lacks() -> None:
+    steps = [{"kind": "curve", "direction": "forward",
+              "curves": [{"x": [0, 1, 1 + 1e-12, 2], "y": [0, 1, 2, 3]}]}]  # fmt: skip
+    conversion = _core.ColourConversion(json.dumps(steps))
+    recolourer = Core("single").recolourer(DOCUMENTS["still-edited"], 7.0)
+    with pytest.raises(ValueError, match="a conversion beyond single precision"):
+        draw(light(), recolourer, conversion=conversion)
 
 
 @pytest.mark.parametrize("name", ["changes", "still-learned"])

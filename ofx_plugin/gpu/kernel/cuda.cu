@@ -6,12 +6,17 @@
 #define P4D_TABLE const float *__restrict__ t_, const float *__restrict__ g_,
 #define P4D_PASS t_, g_,
 #define P4D_T(i) t_[i]
+#define P4D_CURVES P4D_TABLE
+#define P4D_C(i) P4D_G(i)
 #define P4D_G(i) __ldg(g_ + (i))
 #define P4D_SQRT sqrtf
 #define P4D_ATAN2 atan2f
 #define P4D_ABS fabsf
 #define P4D_MIN fminf
 #define P4D_MAX fmaxf
+#define P4D_LOG2 log2f
+#define P4D_EXP2 exp2f
+#define P4D_POW powf
 @P4D_FRAME@
 /* As in opencl.cl. The table is copied to memory that the threads of a block share. */
 extern "C" __global__ void p4d_draw(const float *in, float *out, const float *table,

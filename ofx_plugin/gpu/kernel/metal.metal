@@ -7,12 +7,17 @@
 #define P4D_TABLE constant const float *t_, device const float *g_,
 #define P4D_PASS t_, g_,
 #define P4D_T(i) t_[i]
+#define P4D_CURVES P4D_TABLE
+#define P4D_C(i) P4D_G(i)
 #define P4D_G(i) g_[i]
 #define P4D_SQRT metal::sqrt
 #define P4D_ATAN2 metal::atan2
 #define P4D_ABS metal::fabs
 #define P4D_MIN metal::fmin
 #define P4D_MAX metal::fmax
+#define P4D_LOG2 metal::log2
+#define P4D_EXP2 metal::exp2
+#define P4D_POW metal::pow
 @P4D_FRAME@
 struct p4d_window { int in_start, in_row, out_start, out_row, width, height, x1, y1, x2, y2; };
 

@@ -7,12 +7,17 @@
 #define P4D_TABLE __constant const float *t_, __global const float *g_,
 #define P4D_PASS t_, g_,
 #define P4D_T(i) t_[i]
+#define P4D_CURVES P4D_TABLE
+#define P4D_C(i) P4D_G(i)
 #define P4D_G(i) g_[i]
 #define P4D_SQRT sqrt
 #define P4D_ATAN2 atan2
 #define P4D_ABS fabs
 #define P4D_MIN fmin
 #define P4D_MAX fmax
+#define P4D_LOG2 log2
+#define P4D_EXP2 exp2
+#define P4D_POW pow
 @P4D_FRAME@
 /* Draws a window of RGBA pixels. Pixel (x, y) of the window is at `*_start` + y * `*_row` + 4 x, in
    floats; the source covers [x1, x2) x [y1, y2) of it, and the rest becomes transparent black. */
