@@ -15,16 +15,17 @@ import types
 from collections.abc import Callable, Iterable, Iterator
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
-from multiprocessing.context import ForkContext, SpawnContext
 from pathlib import Path
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from palette4d.common import answers, files, sandbox
 from palette4d.common.errors import Palette4dError, in_words
 
 if sys.platform == "win32":
     from palette4d.common import windows
+if TYPE_CHECKING:
+    from multiprocessing.context import ForkContext, SpawnContext
 
 Result = TypeVar("Result")
 
@@ -164,7 +165,7 @@ class Child:
             if self._reads is not None:
                 folder = files.temporary_folder(Path(tempfile.gettempdir()))
                 confined = self._reads, self._own.enter_context(folder)
-            inherited = _handles(but=theirs) if isinstance(context, ForkContext) else []
+            inherited = _handles(but=theirs) if context.get_start_method() == "fork" else []
             arguments = (theirs, self.seconds, self.megabytes, confined, inherited)
             self._process = context.Process(target=_serve, args=arguments, daemon=True)
             self._process.start()
