@@ -304,6 +304,11 @@ style: $(TOOLS)/.installed
 types: $(TOOLS)/.installed $(TEST_VENV)/.installed
 	@echo "== mypy --strict on the installed wheel"
 	$(TOOLS)/bin/mypy --python-executable $(TEST_VENV)/bin/python -p palette4d
+	@echo "== the same as Windows and macOS see it, which nothing here runs"
+	@for system in win32 darwin; do \
+		$(TOOLS)/bin/mypy --python-executable $(TEST_VENV)/bin/python --platform $$system \
+			--cache-dir .mypy_cache/$$system -p palette4d || exit; \
+	done
 	$(TOOLS)/bin/mypy --python-executable $(TEST_VENV)/bin/python tools
 	@echo "== stubtest: _core.pyi against the compiled module"
 	@PYTHONPATH=$$($(TOOLS)/bin/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))') \

@@ -17,15 +17,13 @@ from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from palette4d.common import answers, files, sandbox
 from palette4d.common.errors import Palette4dError, in_words
 
 if sys.platform == "win32":
     from palette4d.common import windows
-if TYPE_CHECKING:
-    from multiprocessing.context import ForkContext, SpawnContext
 
 Result = TypeVar("Result")
 
@@ -158,7 +156,7 @@ class Child:
                 resource_tracker.ensure_running()
             self._spawn(multiprocessing.get_context("spawn"))
 
-    def _spawn(self, context: ForkContext | SpawnContext) -> None:
+    def _spawn(self, context: Any) -> None:
         with _without_interrupts(), _without_main():
             self._pipe, theirs = context.Pipe()
             confined = None
@@ -183,7 +181,7 @@ def done(children: Iterable[Child]) -> list[Child]:
 @contextlib.contextmanager
 def _without_interrupts() -> Iterator[None]:
     """Block Ctrl-C for this thread and for processes that start meanwhile."""
-    if not hasattr(signal, "pthread_sigmask"):
+    if sys.platform == "win32":
         yield
         return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})

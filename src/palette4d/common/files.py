@@ -289,7 +289,7 @@ def _copy_permissions(path: Path, handle: int) -> None:
 
 def _copy_attributes(path: Path, handle: int) -> bool:
     """Copy extended attributes; return whether an access list, if there is one, was copied."""
-    if not hasattr(os, "listxattr"):
+    if sys.platform != "linux":
         return True
     names: list[str] = []
     with contextlib.suppress(OSError):
@@ -358,15 +358,15 @@ def _lock(handle: int) -> bool | None:
 
     Nobody waits: another user may hold a lock for ever.
     """
-    if sys.platform == "win32":
-        return None
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:
-        return None
-    return True
+    if sys.platform != "win32":
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        except BlockingIOError:
+            return False
+        except OSError:
+            pass
+    return None
 
 
 def _sync_folder(folder: Path) -> None:

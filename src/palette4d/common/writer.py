@@ -16,6 +16,7 @@ import secrets
 import shutil
 import signal
 import stat
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -126,6 +127,8 @@ class Writer:
 @contextlib.contextmanager
 def writer_for(promise: Promise) -> Iterator[Writer]:
     """Start the process that writes; it ends, and clears up, when the body or this process ends."""
+    if sys.platform == "win32":
+        raise AssertionError("Windows has no sandbox")
     requests, ask = os.pipe()
     answer, answers = os.pipe()
     pid = os.fork()
@@ -153,6 +156,8 @@ def writer_for(promise: Promise) -> Iterator[Writer]:
 
 
 def _serve(promise: Promise, requests: IO[str], answers: IO[bytes]) -> None:
+    if sys.platform == "win32":
+        return
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # it ends with the command
     held: list[Callable[[], None]] = []

@@ -43,6 +43,8 @@ def has_screen() -> bool:
 
 def answers(display: str) -> bool:
     """Whether an X server answers at a display such as ":0" or "host:10.0"; Qt aborts without."""
+    if sys.platform == "win32":
+        return False
     match = re.fullmatch(r"(?:unix)?([^:]*):(\d+)(?:\.\d+)?", display)
     if match is None:
         return False
