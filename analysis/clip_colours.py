@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.losses import LOST_SHARE
 
+from palette4d.grade.edits import DIGITS
+
 F64 = NDArray[np.float64]
 
 # Entries and colours per entry: with four digits each, about 25 KB as JSON.
@@ -24,8 +26,6 @@ CELLS = 32
 # Weight of a candidate colour: its share of the pixels, at least `LOST_SHARE`, to this power. With
 # larger powers, a lamp of a few pixels is not chosen for its distance.
 ROOT = 0.25
-# Decimal places of the JSON: a tenth of an 8-bit step.
-DIGITS = 4
 
 
 def clip_colours(frames: Sequence[FrameStatistics]) -> list[dict[str, Any]]:

@@ -31,8 +31,6 @@ Links = tuple[tuple[int, int], ...]
 # Cap on the nodes of the branch and bound; at the cap it returns its best solution. Real clips need
 # far fewer.
 MOST_NODES = 200_000
-# Cost of a broken rule, in RGB distance: more than breaking it can save.
-BROKEN = 10.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -111,7 +109,7 @@ def _search(
         _breadth_first(near),
         strict=strict,
         bound=bound,
-        broken_cost=BROKEN,
+        broken_cost=float(distance.sum()),  # more than breaking a rule can save
         most_nodes=MOST_NODES,
     )
     return (tuple(links), broken) if links else None, complete

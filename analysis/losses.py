@@ -17,6 +17,7 @@ from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette
 
 from palette4d import _core
+from palette4d.grade.palette import FAR
 
 F64 = NDArray[np.float64]
 ValueAndGradient = Callable[[F64], tuple[float, F64]]
@@ -30,7 +31,7 @@ STOPPED = (
 )
 # RGB distance outside the palette beyond which a pixel is lost: edits of the palette do not reach
 # it. Lost pixels below LOST_SHARE of a frame are ignored, as hot pixels or glints.
-LOST, LOST_SHARE = 0.25, 1e-4
+LOST, LOST_SHARE = FAR, 1e-4
 # `descend`: the longest step, in RGB or in clip lengths; the number of steps that grow up to it;
 # Adam's beta 1 and 2, the decay of the gradient's mean and mean square; the square that avoids a
 # division by zero.

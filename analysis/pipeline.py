@@ -35,7 +35,7 @@ from palette4d.analysis.baselines import paper_thresholds, rgbt_hull
 from palette4d.analysis.block_merging import Block
 from palette4d.analysis.dense_polytope import DensePolytope
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
-from palette4d.analysis.losses import LOST_SHARE, Losses, thread_count
+from palette4d.analysis.losses import EVALUATIONS, LOST_SHARE, Losses, thread_count
 from palette4d.analysis.objective import Priced, losses_of, refine_jointly
 from palette4d.analysis.options import LIKE, AnalysisOptions
 from palette4d.analysis.polytope import FramePalette, SkewPolytope
@@ -53,8 +53,6 @@ from palette4d.media.clip_base import Clip, describe, even_step
 from palette4d.media.colour_space import SpaceOptions
 
 T = TypeVar("T")
-# Gradient steps of an earlier palette on the coarse colours, before vertex refinement.
-MOVING_STEPS = 30
 Progress = Callable[[str, int, int], object]
 """Called as progress(stage, done, total)."""
 
@@ -350,7 +348,7 @@ def _moved(run: _Run, earlier: SkewPolytope) -> SkewPolytope:
     """Move the palette of an earlier version to the colours of this clip."""
     frames, gamut, options = run.frames, run.gamut, run.options
     run.record("earlier_palette", earlier)
-    near, _ = refine_jointly(earlier, frames, gamut, options, MOVING_STEPS, coarse=True)
+    near, _ = refine_jointly(earlier, frames, gamut, options, EVALUATIONS, coarse=True)
     polytope = vertex_refinement.refine(near, frames, gamut, options)
     run.record("vertex_refinement", polytope)
     run.report("vertex_refinement", 1, 1)

@@ -15,7 +15,7 @@ from palette4d.analysis.options import LIKE, OPTIONS, AnalysisOptions
 from palette4d.analysis.report.quality import Report
 
 from palette4d.common.message import Arg, Message
-from palette4d.common.text import counted
+from palette4d.common.text import counted, some_of
 
 # Thresholds of L for a badly fitting frame: a multiple of the median frame's L, and an L.
 BAD_FRAME, BAD_L = 4.0, 0.3
@@ -79,10 +79,9 @@ def _fit(x: Report, options: AnalysisOptions) -> str:
     """Frames that the palette fits loosely."""
     bad = [f.frame for f in x.fits if max(BAD_L, BAD_FRAME * x.median_loss) < f.L]
     if bad:
-        names = ", ".join(map(str, bad[:8])) + (", …" if len(bad) > 8 else "")
         what = (
             f"{len(bad)} of {counted(len(x.fits), 'frame')} fit badly (L up to {x.worst.L:.2f}, "
-            f"the median frame {x.median_loss:.2f}): {names}"
+            f"the median frame {x.median_loss:.2f}): {some_of(bad)}"
         )
     elif x.mean_loss > BAD_L:
         what = f"the palette fits the clip loosely (mean L {x.mean_loss:.2f})"

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from palette4d.common.errors import Palette4dError
 from palette4d.grade import follow
+from palette4d.grade.keyframes import MOST_KEYS
 from palette4d.grade.picks import PathKey
 from palette4d.media.array_clip import ArrayClip
 
@@ -95,7 +96,7 @@ def test_few_keys_and_little_memory(clip: ArrayClip, monkeypatch: pytest.MonkeyP
         progress=lambda done, total: seen.append((done, total)),
     )
     assert seen[-1][1] <= 17
-    assert len(path) <= follow.MOST_KEYS + 1
+    assert len(path) <= MOST_KEYS + 1
 
 
 def test_a_frame_that_the_clip_lacks_is_an_error(clip: ArrayClip) -> None:

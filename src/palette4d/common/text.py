@@ -4,7 +4,7 @@ import re
 import shlex
 import sys
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from palette4d import _core
@@ -18,6 +18,16 @@ def counted(count: int, one: str, several: str | None = None) -> str:
     ('1 bad frame', '0 vertices')
     """
     return f"{count} {one if count == 1 else several or one + 's'}"
+
+
+def some_of(words: Iterable[object]) -> str:
+    """Return the first eight of a list, as messages name them.
+
+    >>> some_of(["v1", "v2"]), some_of(range(10))
+    ('v1, v2', '0, 1, 2, 3, 4, 5, 6, 7, …')
+    """
+    first, rest = (listed := list(words))[:8], listed[8:]
+    return ", ".join(map(str, first)) + (", …" if rest else "")
 
 
 def percent(share: float) -> str:

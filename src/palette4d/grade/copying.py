@@ -38,8 +38,6 @@ NEAR = 0.05
 #: Largest differences of a copy that fits, as shares of the grade's mean change: the second
 #: while the difference is below a step of 8 bits. A tenth of such a step is rounding.
 FITS, FITS_BELOW_A_STEP, ROUNDING = 0.3, 0.5, 0.1 / 255
-#: Most stops of an edge.
-MOST_STOPS = 64
 
 
 @dataclass(frozen=True)
@@ -246,7 +244,7 @@ def _handles(target: Grade, graded: Callable[[F64, float], F64]) -> Iterator[tup
             *(new - old for _, old, new in samples),
             shifts[edge["to"]],
         ]
-        for index in needed(times, np.array(changes), (), VISIBLE, MOST_STOPS)[1:-1]:
+        for index in needed(times, np.array(changes), (), VISIBLE)[1:-1]:
             frame, _, new = samples[index - 1]
             id_ = new_id("s", taken)
             taken.add(id_)

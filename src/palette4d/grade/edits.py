@@ -44,6 +44,9 @@ LARGEST_COLOUR = 1e6
 #: path and stops of a copy that change less are left out.
 VISIBLE = 3 / 255
 
+#: Decimal places of measured code values and shares in sidecars: a tenth of an 8-bit step.
+DIGITS = 4
+
 _HEX = re.compile(r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})")
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
-from palette4d.grade.edits import VISIBLE, Colour, as_colour
+from palette4d.grade.edits import DIGITS, VISIBLE, Colour, as_colour
 from palette4d.grade.keyframes import needed
 from palette4d.grade.picks import ALIKE, PathKey
 from palette4d.media.clip_base import Clip, FrameError
@@ -26,16 +26,12 @@ F64 = NDArray[np.float64]
 Progress = Callable[[int, int], object]
 """Called as progress(done, total)."""
 
-#: Digits of a path's code values and shares. Steps of the mean shift below the last digit end it.
-DIGITS = 4
-#: Rounds of the mean shift from one frame to the next. With 100, 15 of 140 paths slide to another
-#: colour (docs/lab/picks.md).
+#: Most rounds of the mean shift from one frame to the next; a step below `DIGITS` ends them. With
+#: 100, 15 of 140 paths slide to another colour (docs/lab/picks.md).
 ROUNDS = 8
 #: Weight of the path's curvature, in frames^4: jitter shorter than 2 pi STIFF^(1/4) = 12 frames is
 #: smoothed, else the grade would flicker. Larger: the path is late where a light changes.
 STIFF = 12.0
-#: Weight of the colours that the user gave, against 1 for the others, so that they are met.
-PINNED = 1e6
 #: Share of the way back to its first colour that a path goes in each frame, while that has as many
 #: neighbours as at first. Without it, 34 of 140 paths drift by more than 0.05.
 HOME = 0.5
@@ -51,8 +47,6 @@ LEAST_SHARE = 1e-5
 MOST_FRAMES = 600
 #: Colours kept for each frame.
 MOST_COLOURS = 2048
-#: Most keys of a path beside the given ones; longer paths are simplified further.
-MOST_KEYS = 48
 #: Tolerance of `there` at 0 and 1: smoothing overshoots the ends of a fade by less.
 OVERSHOOT = 0.05
 
@@ -105,7 +99,7 @@ def paths(
         joined[:, :3] = _without_drift(joined[:, :3], np.array(starts[0][1]))
     path = _smoothed(joined, [frames.index(frame) for frame in known])
     path[:, 3] = np.clip((path[:, 3] - OVERSHOOT) / (1 - 2 * OVERSHOOT), 0.0, 1.0)
-    kept = needed(frames, path, map(frames.index, known), VISIBLE, MOST_KEYS)
+    kept = needed(frames, path, map(frames.index, known), VISIBLE)
     path = np.round(path, DIGITS)
     return tuple(
         PathKey(frames[i], as_colour(path[i, :3]), frames[i] in known, float(path[i, 3]))
@@ -200,12 +194,13 @@ def _without_drift(path: F64, start: F64) -> F64:
 
 def _smoothed(path: F64, fixed: Sequence[int]) -> F64:
     """Return the path without its jitter (Whittaker's smoothing); fixed places stay."""
-    weight = np.ones(len(path))
-    weight[list(fixed)] = PINNED
     bend = np.diff(np.eye(len(path)), 2, axis=0)
-    smooth = np.linalg.solve(np.diag(weight) + STIFF * bend.T @ bend, weight[:, None] * path)
-    smooth[list(fixed)] = path[list(fixed)]
-    return np.asarray(smooth, np.float64)
+    system = np.eye(len(path)) + STIFF * bend.T @ bend
+    free = np.delete(np.arange(len(path)), fixed)
+    pull = system[np.ix_(free, fixed)] @ path[fixed]
+    smooth = path.copy()
+    smooth[free] = np.linalg.solve(system[np.ix_(free, free)], path[free] - pull)
+    return smooth
 
 
 def _shifted(colour: F64, before: tuple[F64, F64], after: tuple[F64, F64]) -> F64:

@@ -5,13 +5,16 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+#: Most keys that are kept for the tolerance: a path or an edge with more is simplified further.
+MOST_KEYS = 64
+
 
 def needed(
     times: Sequence[float],
     values: NDArray[np.float64],
     fixed: Iterable[int],
     tolerance: float,
-    most: int | None = None,
+    most: int = MOST_KEYS,
 ) -> list[int]:
     """Return the indices of the keys that are needed (Douglas and Peucker).
 
@@ -19,7 +22,7 @@ def needed(
     `most` others. Values of the other keys differ from linear interpolation by up to `tolerance`.
     """
     kept = sorted({0, len(times) - 1, *fixed})
-    limit = len(times) if most is None else most + len(kept)
+    limit = most + len(kept)
     while len(kept) < limit:
         chosen = [times[i] for i in kept]
         lines = [np.interp(times, chosen, column[kept]) for column in values.T]

@@ -9,7 +9,7 @@ from palette4d import _core
 from palette4d.common.message import Arg
 from palette4d.grade.edits import Colour
 
-#: Distance in code values above which edits of a palette colour hardly change the given colour.
+#: Distance in code values above which edits of a palette colour hardly change another colour.
 FAR = 0.25
 
 

@@ -41,7 +41,6 @@ Compare = Literal["wipe", "side"]
 #: needs 400 MB.
 LARGE = 16_000_000
 Missing = Literal["hold", "black", "error"]
-_LINE = np.float32(1.0)  # the line of a wipe, in code values: white
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,7 @@ def compared(source: F32, edited: F32, how: Compare) -> F32:
         return np.concatenate([source, edited], axis=1)
     middle, half_line = source.shape[1] // 2, max(1, source.shape[1] // 960)
     picture = np.concatenate([source[:, :middle], edited[:, middle:]], axis=1)
-    picture[:, middle - half_line : middle + half_line] = _LINE
+    picture[:, middle - half_line : middle + half_line] = 1.0
     return picture
 
 

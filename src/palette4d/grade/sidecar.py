@@ -13,6 +13,7 @@ from typing import Any, Literal
 from palette4d import _core
 from palette4d.common.errors import Arg, Palette4dError, SidecarError
 from palette4d.common.files import link_target, refuse_existing, replacing
+from palette4d.common.json_files import LARGEST_FILE
 from palette4d.common.locking import locked
 from palette4d.common.text import counted
 from palette4d.grade.members import Fields, edits_fields, edits_from
@@ -23,9 +24,6 @@ Saved = tuple[_core.Sidecar, Fields, bytes]
 OnEdits = Literal["refuse", "keep", "drop"]
 
 SCHEMA = "palette4d.sidecar"
-
-#: The longest text that the core accepts.
-_LARGEST_FILE = 64 << 20
 
 
 def new_document(
@@ -77,7 +75,7 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
         # Opening a pipe would block until a program writes into it.
         if stat.S_ISREG(Path(path).stat().st_mode):
             with Path(path).open("rb") as stream:
-                return stream.read(_LARGEST_FILE + 1)
+                return stream.read(LARGEST_FILE + 1)
     except OSError as error:
         reason = error.strerror
     else:

@@ -12,8 +12,8 @@ meets all of these conditions:
 - The code values change by `LEAST_SHIFT` on average in some channel: near black one step of 8 bits
   moves every pixel to another cell of the histogram.
 - It is `LEAST_RATIO` times the differences around it: the second largest of the `AROUND` before or
-  after. The factor is doubled near the ends of the clip, with fewer than `SURE` on a side. A pan, a
-  fade, a time lapse or flicker change all the time.
+  after. The factor is doubled near the ends of the clip, where less than half of them are there on
+  a side. A pan, a fade, a time lapse or flicker change all the time.
 - No frames around it agree over a gap of one or two frames, as they do around a flash.
 
 A dissolve is not a cut: a palette follows it in time. A cut between pictures of equal colours is
@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d.common.message import ANALYZE_SHOTS, Arg, Message
-from palette4d.common.text import counted
+from palette4d.common.text import counted, some_of
 from palette4d.media.colour_histogram import mean_shift
 
 F64 = NDArray[np.float64]
@@ -40,14 +40,10 @@ F64 = NDArray[np.float64]
 LEAST_DIFFERENCE = 0.15
 LEAST_RATIO = 3.0
 LEAST_SHIFT = 0.01  # one step of 8 bits from black measures 0.009, others less
-# Smaller differences count as this: after a still picture any change would look large.
-NOISE = 0.01
 # Around a flash the frames agree again: they differ by at most this share of the jump.
 AGREEMENT = 0.5
 LONGEST_FLASH = 2
 AROUND = 5
-SURE = 3
-MOST_SHOWN = 8
 
 
 def find_cuts(histograms: Iterable[tuple[int, F64]]) -> list[int]:
@@ -82,7 +78,7 @@ def _is_cut(gaps: dict[int, list[float]], at: int) -> bool:
     """Return whether a shot begins with frame `at`, an index from 1."""
     jumps = gaps[1]
     jump = jumps[at - 1]
-    around = max(_activity(jumps, at - 1, at), NOISE)
+    around = _activity(jumps, at - 1, at)
     if jump < LEAST_DIFFERENCE or jump < LEAST_RATIO * around:
         return False
     for length in range(1, LONGEST_FLASH + 1):
@@ -99,7 +95,7 @@ def _activity(jumps: list[float], start: int, end: int) -> float:
     if not before and not after:
         return np.inf
     activity = max(_usual(side) for side in (before, after) if side)
-    return activity if min(len(before), len(after)) >= SURE else 2 * activity
+    return activity if 2 * min(len(before), len(after)) > AROUND else 2 * activity
 
 
 def _usual(jumps: list[float]) -> float:
@@ -123,8 +119,8 @@ def refusal(frames: Sequence[int], cuts: Sequence[int]) -> Message:
     return Message(
         f"found {counted(len(cuts), 'sudden cut')}: a new shot begins at {_places(cuts)}; expected "
         "one shot, since a palette must not span a cut. Analyse each shot by itself "
-        f"({_some(shots)}; {ANALYZE_SHOTS} does all of them), or give {Arg('allow_cuts', True)} to "
-        f"analyse all frames as one shot.{_flash(frames, cuts)}"
+        f"({some_of(shots)}; {ANALYZE_SHOTS} does all of them), or give "
+        f"{Arg('allow_cuts', True)} to analyse all frames as one shot.{_flash(frames, cuts)}"
     )
 
 
@@ -159,11 +155,7 @@ def note(cuts: Sequence[int]) -> str:
 
 
 def _places(cuts: Sequence[int]) -> str:
-    return f"frame{'s' * (len(cuts) != 1)} {_some([str(cut) for cut in cuts])}"
-
-
-def _some(texts: Sequence[str]) -> str:
-    return ", ".join(texts[:MOST_SHOWN]) + (", …" if len(texts) > MOST_SHOWN else "")
+    return f"frame{'s' * (len(cuts) != 1)} {some_of(cuts)}"
 
 
 def _shots(frames: Sequence[int], cuts: Sequence[int]) -> list[str]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.colour.ocio_config import from_anywhere
 from palette4d.common.errors import Arg, Message, UnfinishedError
-from palette4d.common.text import counted, file_safe
+from palette4d.common.text import counted, file_safe, some_of
 from palette4d.grade.sidecar import OnEdits
 from palette4d.jobs.workers import Workers
 from palette4d.media.clip import open_clip
@@ -156,10 +156,10 @@ def _of_edit(
             f"{float(edit.rate):.4g} are assumed"
         )
     if renamed:
-        some = ", ".join(renamed[:8]) + (", …" if len(renamed) > 8 else "")
         notes.append(
             f"{counted(len(renamed), 'shot has the name', 'shots have the names')} of others and "
-            f"{'was' if len(renamed) == 1 else 'were'} renamed by the first frame: {some}"
+            f"{'was' if len(renamed) == 1 else 'were'} renamed by the first frame: "
+            f"{some_of(renamed)}"
         )
     source = Source(file_safe(path.stem), str(path), timeline_files.sha256(path), edit.rate)
     return source, found, notes

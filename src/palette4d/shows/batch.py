@@ -21,7 +21,7 @@ from palette4d.analysis.options import AnalysisOptions
 from palette4d.colour.ocio_config import files_of_config
 from palette4d.common.errors import Arg, Palette4dError, in_words
 from palette4d.common.files import make_folder
-from palette4d.common.text import counted
+from palette4d.common.text import counted, some_of
 from palette4d.grade import reanalysis, sidecar
 from palette4d.jobs.workers import Failed, Workers
 from palette4d.media.clip import open_clip
@@ -88,7 +88,7 @@ def analyse(
     sidecars are complete, and the manifest lists them.
     """
     if unknown := [name for name in options.only if name not in {shot.name for shot in shots}]:
-        some = ", ".join(sorted(shot.name for shot in shots)[:8]) + (", …" if shots[8:] else "")
+        some = some_of(sorted(shot.name for shot in shots))
         raise Palette4dError(
             f"{Arg('only')}: there is no shot {unknown[0]!r}; expected names such as {some}"
         )

@@ -11,7 +11,7 @@ from typing import Any
 from palette4d import _core
 from palette4d.common.arguments import parse_frames
 from palette4d.common.errors import Arg, Palette4dError, UnfinishedError
-from palette4d.common.text import counted
+from palette4d.common.text import counted, some_of
 from palette4d.grade.document import Document
 from palette4d.jobs.workers import Workers
 from palette4d.lut_export import series
@@ -271,9 +271,9 @@ def sidecars(paths: Iterable[Path]) -> tuple[list[Path], list[str]]:
         done, others = manifests.sidecars(path)
         found += done
         if others:
-            some = ", ".join(others[:8]) + (", …" if len(others) > 8 else "")
             notes.append(
-                f"{path}: {counted(len(others), 'shot')} not analysed and left out: {some}"
+                f"{path}: {counted(len(others), 'shot')} not analysed and left out: "
+                f"{some_of(others)}"
             )
     return found, notes
 

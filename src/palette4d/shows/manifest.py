@@ -17,6 +17,7 @@ from palette4d import _core
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.files import replacing
 from palette4d.common.json_files import UnusableFile, read_json
+from palette4d.common.text import some_of
 from palette4d.shows.edl_cdl import Cdl
 from palette4d.shows.shots import Place, Shot
 
@@ -242,10 +243,9 @@ def sidecars(path: Path) -> tuple[list[Path], list[str]]:
     done = [path.parent / e.sidecar for e in manifest.entries if e.status == DONE]
     others = [e.shot.name for e in manifest.entries if e.status != DONE]
     if gone := [file.name for file in done if not file.exists()]:
-        some = ", ".join(gone[:8]) + (", …" if len(gone) > 8 else "")
         raise Palette4dError(
-            f"{path}: found no sidecar {some} beside it, expected those of shots that are done; "
-            "bring them back, or run `palette4d analyze` again, which makes what is missing"
+            f"{path}: found no sidecar {some_of(gone)} beside it, expected those of shots that are "
+            "done; bring them back, or run `palette4d analyze` again, which makes what is missing"
         )
     if not done:
         raise Palette4dError(

@@ -12,7 +12,7 @@ from pathlib import Path
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import refuse_existing, replacing
 from palette4d.common.json_files import read_regular
-from palette4d.common.text import counted
+from palette4d.common.text import counted, some_of
 from palette4d.lut_export import cdl as cdls
 from palette4d.lut_export.series import Series
 from palette4d.shows import edl_cdl, edl_text, edl_timeline, timeline_files
@@ -90,10 +90,9 @@ def write_edl(
     names = list(dict.fromkeys(replaced))
     if not names:
         return []
-    some = ", ".join(names[:8]) + (", …" if len(names) > 8 else "")
     return [
         f"{counted(len(names), 'event has', 'events have')} a CDL in {source}; in the copy that of "
-        f"the palette takes its place: {some}"
+        f"the palette takes its place: {some_of(names)}"
     ]
 
 
