@@ -1,4 +1,4 @@
-"""The losses against a plain reference that shares no code with the core."""
+"""Losses are minimised, and their binding says what it refuses."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import weakref
 import numpy as np
 import pytest
 from palette4d.analysis.frame_statistics import Gamut
-from palette4d.analysis.losses import NO_FACES, minimise, refine_palette, smoothness
+from palette4d.analysis.losses import NO_FACES, minimise, refine_palette
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette
 
@@ -29,43 +29,6 @@ def loss(points, palette, counts=None, k=1.0):
         tree(points, counts), np.asarray(palette, float), NO_FACES, _core.LossWeights(50.0, k)
     )
     return {"R": r, "C": c, "shape": shape, "outside": outside, "far": far}
-
-
-def test_gradient_matches_differences():
-    rng = np.random.default_rng(7)
-    colours = tree(rng.random((500, 3)))
-    palette = BOX + rng.normal(0, 0.02, BOX.shape)
-    faces = np.array([[0, 1, 2], [1, 3, 2]], np.int32)
-    weights = _core.LossWeights(50.0, 500.0, convexity=0.7, separation=0.6, reach=0.1)
-
-    def value(x):
-        r, c, shape, *_ = _core.palette_loss(colours, x, faces, weights)
-        return 50 * r + c + shape
-
-    *_, gradient = _core.palette_loss(colours, palette, faces, weights)
-    for i, c in itertools.product(range(8), range(3)):
-        step = np.zeros((8, 3))
-        step[i, c] = 1e-6
-        slope = (value(palette + step) - value(palette - step)) / 2e-6
-        assert gradient[i, c] == pytest.approx(slope, abs=1e-4)
-
-
-@pytest.mark.parametrize("weights", [(1.0, 1.0), (0.25, 1.0), (0.0, 0.5)])
-def test_smoothness_by_hand_and_its_gradient(weights):
-    vertices = np.array([[0, 0, 0, 0], [0.3, 0.4, 0, 5], [0.1, 0.2, 0.3, 10]], float)
-    edges = np.array([[0, 1], [1, 2]], np.int32)
-    factors = np.array(weights)
-    k, gradient = smoothness(vertices, edges, 10.0, factors)
-    slopes = 0.5 / 0.5, np.linalg.norm([0.2, 0.2, 0.3]) / 0.5
-    assert k == pytest.approx(factors @ slopes / 2)
-    if weights == (1.0, 1.0):
-        assert smoothness(vertices, edges, 10.0)[0] == k
-    for i, c in itertools.product(range(3), range(4)):
-        step = np.zeros((3, 4))
-        step[i, c] = 1e-6
-        up, down = (smoothness(vertices + s * step, edges, 10.0, factors)[0] for s in (1, -1))
-        assert gradient[i, c] == pytest.approx((up - down) / 2e-6, abs=1e-6)
-    assert smoothness(vertices, np.zeros((0, 2), np.int32), 10.0)[0] == 0
 
 
 def test_refinement_never_worsens_and_stays_in_its_box():
@@ -116,10 +79,6 @@ def test_what_an_objective_knows_is_let_go_of():
 
 
 def test_bad_arguments_are_refused():
-    with pytest.raises(ValueError, match="finite"):
-        tree([[np.nan, 0, 0]])
-    with pytest.raises(ValueError, match="positive"):
-        tree([[0, 0, 0]], np.array([0.0]))
     with pytest.raises(ValueError, match="shape"):
         _core.palette_loss(tree([[0, 0, 0]]), np.zeros((4, 2)), NO_FACES, WEIGHTS)
     with pytest.raises(ValueError, match="at least one"):

@@ -84,16 +84,6 @@ def test_planes_of_luma_and_chroma():
         binner.add_luma_chroma(grey, none[:1], none, bits=8, **how)
 
 
-def test_colours_with_counts():
-    binner = _core.ColourBinner()
-    binner.add_colours([[0, 0, 0], [0.5, 0.5, 0.5]], [2, 3])
-    binner.add_colours([[0, 0, 0]], [1])
-    fine, *_ = binner.take(9, 9)
-    assert sorted(fine.counts) == [3, 3]
-    with pytest.raises(ValueError, match="colour 1 is not"):
-        binner.add_colours([[0, 0, 0], [0, np.nan, 0]], [1, 1])
-
-
 @pytest.mark.parametrize(
     ("image", "match"),
     [

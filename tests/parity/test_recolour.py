@@ -13,6 +13,9 @@ from parity.cases import (
     EDITED,
     FAST_TOLERANCE,
     PICTURE_TOLERANCE,
+    learned_odds,
+    pick,
+    picked,
     picked_documents,
     picture,
     random_hull,
@@ -25,11 +28,15 @@ from parity.implementations import (
     REFERENCE,
 )
 from parity.reference import (
+    Document,
     Picked,
     Picks,
+    change_of,
     hue_odds,
+    on_path,
     picks_at,
     recolour,
+    strength_of,
 )
 
 from palette4d import _core
@@ -60,24 +67,54 @@ def test_rounds_are_rare_where_the_implementations_differ() -> None:
 
 
 PICKED = sorted(picked_documents())
+GRIDS = {"a": learned_odds(1)}
 
 
 @pytest.mark.parametrize("name", PICKED)
-def test_the_core_has_the_picks_of_the_reference(name: str) -> None:
+def test_the_core_has_the_mattes_of_the_reference(name: str) -> None:
     document = DOCUMENTS[name]
     for frame in times_of(name):
         expected, found = picks_at(document, frame), CORE.sidecar(document).picks_at(frame)
         assert len(found.picks) == len(expected.picks)
-        for wanted, (colour, change, strength, matte) in zip(
-            expected.picks, found.picks, strict=True
-        ):
-            np.testing.assert_allclose(colour, wanted.colour, rtol=0, atol=1e-15)
-            np.testing.assert_allclose(change, wanted.change, rtol=0, atol=1e-15)
-            assert strength == pytest.approx(wanted.strength, abs=1e-15)
+        for wanted, (*_, matte) in zip(expected.picks, found.picks, strict=True):
             np.testing.assert_allclose(matte, wanted.matte, rtol=0, atol=1e-6)
         assert (found.left is None) == (expected.left is None)
         if found.left is not None:
             np.testing.assert_allclose(found.left, expected.left, rtol=0, atol=1e-6)
+
+
+def changing_picks() -> list[Document]:
+    """Picks whose changes end at 0, at 1 or at their paths, with every kind of range."""
+    red, to = (0.5, 0.25, 0.25), (0.25, 0.75, 0.25)
+    inside = [(0, red, 1), (10, (0.75, 0.75, 0.25), 0.5), (20, (0.125, 0.5, 0.25), 1)]
+    beyond = [(0, red, 1), (5, (-1, 0.25, 0.25), 1), (10, (2, 2, 0.25), 0), (20, red, 1)]
+    return [
+        pick("at-1", red, to, path=inside),
+        pick("at-a-path", red, to, path=beyond),
+        pick("to-a-colour", red, to, toward="colour", path=inside, **{"from": 9}, fade=4),
+        pick("in-and-out", red, to, until=20, fade=3, fade_out=6),
+        pick("overlapping", red, to, **{"from": 12}, until=14, fade=8, fade_out=0),
+    ]
+
+
+@pytest.mark.parametrize("picks", [document["edits"]["picks"] for document in (
+    *(DOCUMENTS[name] for name in PICKED), {"edits": {"picks": changing_picks()}},
+)], ids=[*PICKED, "changing"])  # fmt: skip
+def test_the_core_has_the_changes_of_the_reference(picks: list[Document]) -> None:
+    document = picked(DOCUMENTS["changes"], [{**one, "matte": "a"} for one in picks], GRIDS)
+    sidecar = CORE.sidecar(document)
+    for frame in np.arange(-2, 33, 0.75).tolist():
+        at = min(max(frame, 0.0), 30.0)
+        found = [made[:3] for made in sidecar.picks_at(frame).picks]
+        expected = [
+            (on_path(one, at)[0], change_of(one, at), strength)
+            for one in picks
+            if one["kind"] == "pick" and (strength := strength_of(one, at, 1)) > 0
+        ]
+        assert len(found) == len(expected)
+        for values, wanted in zip(found, expected, strict=True):
+            for value, own in zip(values, wanted, strict=True):
+                np.testing.assert_allclose(value, own, rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("colour", [(0.6, 0.3, 0.2), (0.5, 0.52, 0.5), (0, 0, 0), (0.1, 0.2, 1.4)])

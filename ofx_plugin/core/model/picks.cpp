@@ -76,8 +76,7 @@ double Pick::strength_at(double at, double step) const {
     if (until) strength = std::min(strength, 1 - (at - *until) / ramp_out(step));
     if (!path.empty()) {
         const auto [before, after, weight] = around(path, at);
-        strength = std::max(0.0, std::min(strength, 1.0)) *
-                   (before->there + weight * (after->there - before->there));
+        strength *= before->there + weight * (after->there - before->there);
     }
     return std::max(0.0, std::min(strength, 1.0));
 }

@@ -196,8 +196,9 @@ def _smoothed(path: F64, fixed: Sequence[int]) -> F64:
     """Return the path without its jitter (Whittaker's smoothing); fixed places stay."""
     bend = np.diff(np.eye(len(path)), 2, axis=0)
     system = np.eye(len(path)) + STIFF * bend.T @ bend
-    free = np.delete(np.arange(len(path)), fixed)
-    pull = system[np.ix_(free, fixed)] @ path[fixed]
+    held = np.array(fixed, np.int64)
+    free = np.delete(np.arange(len(path)), held)
+    pull = system[np.ix_(free, held)] @ path[held]
     smooth = path.copy()
     smooth[free] = np.linalg.solve(system[np.ix_(free, free)], path[free] - pull)
     return smooth

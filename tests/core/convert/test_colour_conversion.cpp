@@ -138,24 +138,6 @@ TEST(without_an_edit_every_bit_passes) {
     CHECK(std::memcmp(image.data.data(), before.data.data(), 48) == 0);
 }
 
-TEST(it_is_the_recolouring_between_two_conversions) {
-    Image image{4, 3, {0.1f, 0.5f, 0.02f, 3, 2, 1, -0.1f, 0.01f, 0.2f, 50, 40, 45}};
-    const Image before = image;
-    const Recolourer recolourer = moved_cube();
-    RecolourOptions options;
-    options.precision = Precision::kDouble;
-    converted(recolourer, image.in(), image.out(), options);
-    for (std::size_t i = 0; i < 4; ++i) {
-        const Vec3 p{before.data[3 * i], before.data[3 * i + 1], before.data[3 * i + 2]};
-        const Vec3 expected =
-            chain().to_clip(recolourer.displaced(chain().to_palette(p), options.strength));
-        for (std::size_t c = 0; c < 3; ++c) {
-            CHECK_NEAR(image.data[3 * i + c], expected[c],
-                       1e-6 * std::max(1.0, std::abs(expected[c])));
-        }
-    }
-}
-
 TEST(alpha_is_divided_by_and_odd_pixels_pass) {
     const Recolourer recolourer = moved_cube();
     RecolourOptions options;
@@ -171,21 +153,6 @@ TEST(alpha_is_divided_by_and_odd_pixels_pass) {
     const Image before = odd;
     converted(recolourer, odd.in(), odd.out(), options);
     CHECK(std::memcmp(odd.data.data(), before.data.data(), 64) == 0);
-}
-
-TEST(threads_and_pieces_do_not_show) {
-    Random random(5);
-    Image one{40000, 3, std::vector<float>(120000)};
-    for (float& x : one.data) x = static_cast<float>(random.uniform(-0.1, 3));
-    Image many = one;
-    const Recolourer recolourer = moved_cube();
-    converted(recolourer, one.in(), one.out(), {});
-    RecolourOptions options;
-    options.threads = 3;
-    const std::ptrdiff_t row = 100 * 3 * static_cast<std::ptrdiff_t>(sizeof(float));
-    converted(recolourer, {many.data.data(), 100, 400, 3, row},
-              {many.data.data(), 100, 400, 3, row}, options);
-    CHECK(std::memcmp(one.data.data(), many.data.data(), one.data.size() * sizeof(float)) == 0);
 }
 
 TEST(what_does_not_move_keeps_its_bits_between_conversions) {

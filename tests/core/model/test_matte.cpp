@@ -18,13 +18,6 @@ namespace {
 constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 constexpr double kEndless = std::numeric_limits<double>::infinity();
 
-/// How certainly a colour belongs to a matte, 0..1.
-double membership(const Matte& matte, const Vec3& colour) {
-    const double odds = (MatteGrid::at(matte.odds.data(), pick_point(colour)) - Matte::kMiddle) *
-                        (Matte::kOdds / Matte::kMiddle);
-    return 1 / (1 + std::exp(-odds));
-}
-
 }  // namespace
 
 TEST(shades_of_a_colour_lie_on_a_line) {
@@ -47,11 +40,6 @@ TEST(shades_of_a_colour_lie_on_a_line) {
     }
 }
 
-TEST(distances_count_lightness_less_than_saturation) {
-    CHECK_NEAR(pick_distance2({0.1, 0.2, 0.5}, {0.4, -0.2, 0.5}), 0.25, 1e-15);
-    CHECK_NEAR(pick_distance2({0, 0, 0.5}, {0, 0, 1}), 0.04, 1e-15);
-}
-
 TEST(a_display_curve_is_linear_between_its_values_and_ends_level) {
     const DisplayCurve curve{-1, 3, {0, 0.5, 0.25}};
     CHECK_NEAR(curve(-1), 0, 0);
@@ -66,19 +54,6 @@ TEST(a_display_curve_is_linear_between_its_values_and_ends_level) {
     CHECK(apart(displayed({1, 2, 3}, &curve), {0.5, 0.375, 0.25}) < 1e-15);
 }
 
-TEST(a_step_is_smooth_and_within_0_and_1) {
-    CHECK_EQUAL(smooth_step(-1, 0, 1), 0.0);
-    CHECK_EQUAL(smooth_step(0.5, 0, 1), 0.5);
-    CHECK_EQUAL(smooth_step(7, 0, 1), 1.0);
-}
-
-TEST(colours_near_a_pick_move_along_and_others_do_not) {
-    const Vec3 pick{0.1, 0.2, 0.5};
-    CHECK_EQUAL(nearness(pick, pick), 1.0);
-    CHECK(nearness({0.1, 0.25, 0.5}, pick) > 0.9);
-    CHECK_EQUAL(nearness({0.1, 0.2 + kMovesAlong, 0.5}, pick), 0.0);
-}
-
 TEST(a_hold_spares_what_is_nearer_to_the_pick) {
     const Vec3 pick{0.1, 0.2, 0.5}, hold{0.3, 0.2, 0.5};
     CHECK_EQUAL(spared(hold, hold, pick), 0.0);
@@ -87,40 +62,6 @@ TEST(a_hold_spares_what_is_nearer_to_the_pick) {
     const double beside = spared({0.25, 0.2, 0.5}, hold, pick);
     CHECK(beside > 0 && beside < 0.2);
     CHECK(spared(pick, pick, pick) >= 0);  // 0 by 0 is no NaN
-}
-
-TEST(an_amount_is_1_at_a_saturated_pick_and_follows_shades_and_mixtures) {
-    const Vec3 colour{0.7, 0.3, 0.2};
-    const PickedColour picked(colour);
-    const double own = picked.amount(colour);
-    CHECK_NEAR(own, 1, 0.02);
-    for (const double shade : {0.8, 0.5, 0.3}) {
-        CHECK_NEAR(picked.amount(shade * colour), shade, 0.02);
-    }
-    for (const double part : {0.75, 0.5, 0.25}) {
-        for (const double grey : {0.1, 0.5, 0.9}) {
-            const Vec3 mixture = part * colour + (1 - part) * Vec3{grey, grey, grey};
-            CHECK_NEAR(picked.amount(mixture), part, 0.02);
-        }
-    }
-    for (const double grey : {0.0, 0.2, 0.6, 1.0, 40.0}) {
-        CHECK(picked.amount({grey, grey, grey}) < 0.02);
-    }
-    CHECK(picked.amount({0.2, 0.6, 0.7}) < 0.02);  // the opposite hue
-    // Highlights go on with the same slope, and end at twice the amount.
-    CHECK_NEAR(picked.amount(1.001 * colour) - own, 0.001, 1e-4);
-    CHECK(picked.amount(50.0 * colour) < 2 && picked.amount(50.0 * colour) > 1.9);
-}
-
-TEST(an_amount_of_a_pale_pick_is_its_lightness) {
-    for (const double level : {0.0, 0.02, 0.5, 0.97, 1.0}) {
-        const Vec3 grey{level, level, level};
-        CHECK_NEAR(PickedColour(grey).amount(grey), 1, 1e-12);
-    }
-    const PickedColour middle({0.5, 0.5, 0.5});
-    CHECK_NEAR(middle.amount({0.24, 0.24, 0.24}), 0.5, 1e-12);
-    CHECK_NEAR(middle.amount({0.76, 0.76, 0.76}), 0.5, 1e-12);
-    CHECK(middle.amount({0, 0, 0}) < 0.05 && middle.amount({1, 1, 1}) < 0.05);
 }
 
 TEST(an_amount_is_never_0_at_its_own_pick) {
@@ -167,27 +108,6 @@ TEST(a_grid_is_read_between_its_nodes) {
             for (const double part : {p.part_u, p.part_v, p.part_l}) CHECK(part >= 0 && part <= 1);
         }
     }
-}
-
-TEST(a_hue_matte_takes_shades_and_highlights_of_a_hue_and_no_other) {
-    const Vec3 red{0.7, 0.25, 0.2};
-    const Matte matte = hue_matte(red);
-    CHECK_EQUAL(matte.odds.size(), MatteGrid::kSize);
-    CHECK(*std::max_element(matte.odds.begin(), matte.odds.end()) <= 2 * Matte::kMiddle);
-    CHECK(membership(matte, red) > 0.9);
-    CHECK(membership(matte, 0.4 * red) > 0.9);
-    CHECK(membership(matte, {0.8, 0.5, 0.45}) > 0.9);
-    for (const Vec3& other :
-         {Vec3{0.2, 0.6, 0.2}, Vec3{0.2, 0.3, 0.7}, Vec3{0.1, 0.6, 0.6}, Vec3{0.6, 0.6, 0.2}}) {
-        CHECK(membership(matte, other) < 0.1);
-    }
-}
-
-TEST(a_pale_matte_is_a_ball_around_the_colour) {
-    const Matte white = hue_matte({0.95, 0.95, 0.95});
-    CHECK(membership(white, {0.95, 0.95, 0.95}) > 0.9);
-    CHECK(membership(white, {0.1, 0.1, 0.1}) < 0.1);
-    CHECK(membership(white, {0.95, 0.3, 0.2}) < 0.1);
 }
 
 TEST(memberships_become_log_odds) {

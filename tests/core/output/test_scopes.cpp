@@ -8,8 +8,6 @@
 
 using namespace palette4d;
 using images::Image;
-using images::kInf;
-using images::kNan;
 
 namespace {
 
@@ -34,18 +32,4 @@ TEST(every_pixel_counts_once_in_each_scope) {
         CHECK_EQUAL(sum(counts.vectors), 37U * 23U);
         CHECK(counts.waveform == counted(image, 20, 1).waveform);
     }
-}
-
-TEST(rims_take_what_is_beyond_and_nan_counts_nowhere) {
-    Image image(3, 1, 3);
-    image.data = {kInf, kInf, kInf, -kInf, 0, 0, kNan, 1, 1};
-    const ScopeCounts counts = counted(image, 3, 1);
-    const auto count = [&](int column, int trace, int level) {
-        return counts.waveform[static_cast<std::size_t>(
-            (column * kScopeTraces + trace) * kScopeLevels + level)];
-    };
-    CHECK_EQUAL(count(0, 1, kScopeLevels - 1), 1U);
-    CHECK_EQUAL(count(1, 1, 0), 1U);
-    CHECK_EQUAL(count(1, 2, kScopeBelow), 1U);
-    CHECK_EQUAL(count(2, 2, kScopeBelow + 255), 0U);
 }

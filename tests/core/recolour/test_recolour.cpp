@@ -1,11 +1,9 @@
-#include "model/vec3.hpp"
 #include "recolour/recolour.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <stdexcept>
 
 #include "check.hpp"
 #include "images.hpp"
@@ -51,59 +49,6 @@ TEST(without_an_edit_every_bit_passes) {
         Image off(17, 5, channels);
         cube_recolourer().apply(image.in(), off.out(), {0.0, false, 1});
         CHECK(same_bits(off.data, image.data));
-    }
-}
-
-TEST(a_colour_moves_by_the_weighted_displacements) {
-    const Recolourer recolourer = cube_recolourer();
-    // On a vertex it becomes the edited vertex; half the strength goes half the way.
-    const Vec3 full = recolourer.displaced({1, 1, 1}, 1),
-               half = recolourer.displaced({1, 1, 1}, 0.5);
-    const Vec3 expected{1.2, 0.7, 0.9}, halfway{1.1, 0.85, 0.95};
-    for (std::size_t c = 0; c < 3; ++c) {
-        CHECK_NEAR(full[c], expected[c], 1e-14);
-        CHECK_NEAR(half[c], halfway[c], 1e-14);
-    }
-    // Outside it moves as its closest point does, and keeps its distance.
-    const Vec3 beyond = recolourer.displaced({1.5, 2, 1.25}, 1);
-    CHECK_NEAR(beyond[0], 1.7, 1e-14);
-    CHECK_NEAR(beyond[1], 1.7, 1e-14);
-    CHECK_NEAR(beyond[2], 1.15, 1e-14);
-    // A strength above 1 or below 0 goes on along the line.
-    CHECK_NEAR(recolourer.displaced({1, 1, 1}, 2)[0], 1.4, 1e-14);
-    CHECK_NEAR(recolourer.displaced({1, 1, 1}, -1)[0], 0.8, 1e-14);
-}
-
-TEST(an_affine_edit_moves_every_inner_colour_by_it) {
-    // Weights reproduce the point, hence any affine map of the palette is the map of its inside.
-    Random random(2);
-    for (int round = 0; round < 50; ++round) {
-        const Mesh mesh = random_convex(random, 5 + random.below(8));
-        std::array<Vec3, 3> matrix;
-        for (Vec3& row : matrix) row = random.colour(-1, 1);
-        const Vec3 shift = random.colour(-1, 1);
-        const auto map = [&](const Vec3& p) {
-            Vec3 q = shift;
-            for (std::size_t i = 0; i < 3; ++i) {
-                for (std::size_t j = 0; j < 3; ++j) q[i] += matrix[i][j] * p[j];
-            }
-            return q;
-        };
-        std::vector<Vec3> edited;
-        Vec3 centre{};
-        for (const Vec3& v : mesh.rgb) {
-            edited.push_back(map(v));
-            for (std::size_t c = 0; c < 3; ++c)
-                centre[c] += v[c] / static_cast<double>(mesh.rgb.size());
-        }
-        const Recolourer recolourer(mesh.rgb, edited, mesh.faces);
-        for (const Vec3& v : mesh.rgb) {
-            const double t = random.uniform(0.1, 0.9);
-            const Vec3 p{centre[0] + t * (v[0] - centre[0]), centre[1] + t * (v[1] - centre[1]),
-                         centre[2] + t * (v[2] - centre[2])};
-            const Vec3 found = recolourer.displaced(p, 1), expected = map(p);
-            for (std::size_t c = 0; c < 3; ++c) CHECK_NEAR(found[c], expected[c], 1e-11);
-        }
     }
 }
 
@@ -155,44 +100,6 @@ TEST(what_does_not_move_keeps_its_bits) {
     CHECK_NEAR(result.data[6], 0.25, 1e-7);
 }
 
-TEST(alpha_is_copied_and_premultiplied_colours_are_divided) {
-    const Recolourer recolourer = cube_recolourer();
-    Image straight(5, 1, 4), multiplied(5, 1, 4);
-    const float alphas[] = {1.0f, 0.5f, 0.25f, 2.0f, -0.5f};
-    Random random(4);
-    for (std::size_t i = 0; i < 5; ++i) {
-        for (std::size_t c = 0; c < 3; ++c) {
-            straight.data[4 * i + c] = static_cast<float>(random.uniform(0.1, 0.9));
-            multiplied.data[4 * i + c] = straight.data[4 * i + c] * alphas[i];
-        }
-        straight.data[4 * i + 3] = multiplied.data[4 * i + 3] = alphas[i];
-    }
-    Image a(5, 1, 4), b(5, 1, 4);
-    recolourer.apply(straight.in(), a.out(), {1, false, 1});
-    recolourer.apply(multiplied.in(), b.out(), {1, true, 1});
-    for (std::size_t i = 0; i < 5; ++i) {
-        CHECK_EQUAL(a.data[4 * i + 3], alphas[i]);
-        CHECK_EQUAL(b.data[4 * i + 3], alphas[i]);
-        for (std::size_t c = 0; c < 3; ++c) {
-            CHECK_NEAR(b.data[4 * i + c], a.data[4 * i + c] * alphas[i], 3e-7);
-            CHECK(a.data[4 * i + c] != straight.data[4 * i + c]);
-        }
-    }
-    // No alpha, no colour to speak of: unchanged. Not premultiplied: alpha does not matter.
-    Image odd(5, 1, 4);
-    odd.data = {.5f, .5f,  .5f, 0.f, .5f, .5f,  .5f, -0.f, .5f, .5f,
-                .5f, kNan, .5f, .5f, .5f, kInf, .5f, .5f,  .5f, 1e-45f};
-    Image c(5, 1, 4), d(5, 1, 4);
-    recolourer.apply(odd.in(), c.out(), {1, true, 1});
-    CHECK(std::memcmp(c.data.data(), odd.data.data(), 16 * sizeof(float)) == 0);
-    for (const float& x : c.data) CHECK(std::isfinite(x) || &x == &c.data[11] || &x == &c.data[15]);
-    recolourer.apply(odd.in(), d.out(), {1, false, 1});
-    for (std::size_t i = 0; i < 5; ++i) {
-        CHECK(d.data[4 * i] != .5f);
-        CHECK(std::memcmp(&d.data[4 * i + 3], &odd.data[4 * i + 3], 4) == 0);
-    }
-}
-
 TEST(rows_may_be_padded_upside_down_or_the_same_memory) {
     const Recolourer recolourer = cube_recolourer();
     for (const int channels : {3, 4}) {
@@ -229,21 +136,4 @@ TEST(the_number_of_threads_does_not_show) {
         recolourer.apply(image.in(), result.out(), {0.8, true, threads});
         CHECK(same_bits(result.data, expected.data));
     }
-}
-
-TEST(one_two_and_flat_colours) {
-    // One colour: everything moves alike. Two: by the place along their line.
-    const Recolourer one({{0.5, 0.5, 0.5}}, {{0.6, 0.5, 0.4}}, {});
-    const Vec3 far = one.displaced({3, -2, 0.5}, 1);
-    CHECK_NEAR(far[0], 3.1, 1e-14);
-    CHECK_NEAR(far[1], -2, 0);
-    CHECK_NEAR(far[2], 0.4, 1e-14);
-    const Recolourer two({{0, 0, 0}, {1, 1, 1}}, {{0, 0, 0}, {1, 0, 0}}, {});
-    const Vec3 grey = two.displaced({0.5, 0.5, 0.5}, 1);
-    CHECK_NEAR(grey[0], 0.5, 1e-15);
-    CHECK_NEAR(grey[1], 0, 1e-15);
-    const Recolourer flat(flat_square().rgb, {{0, 0, 0.6}, {1, 0, 0.6}, {1, 1, 0.6}, {0, 1, 0.6}},
-                          flat_square().faces);
-    CHECK_NEAR(flat.displaced({0.3, 0.4, 0.5}, 1)[2], 0.6, 1e-14);
-    CHECK_NEAR(flat.displaced({0.3, 0.4, 0.9}, 1)[2], 1.0, 1e-14);
 }
