@@ -10,6 +10,7 @@ import dataclasses
 import importlib.util
 import itertools
 import json
+import shutil
 import subprocess
 import sys
 
@@ -100,7 +101,7 @@ def some_frames(clip, folder):
     out = folder / "some"
     out.mkdir()
     for source in sorted(clip.iterdir())[:50:7]:
-        (out / source.name).symlink_to(source)
+        shutil.copy(source, out)
     return out
 
 

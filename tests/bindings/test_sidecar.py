@@ -41,7 +41,7 @@ def test_golden_files_arrive_unchanged(path: Path) -> None:
     document = json.loads(path.read_text(encoding="utf-8"))
     read = _core.read_sidecar(path)
     clip, polytope = document["clip"], document["polytope"]
-    assert (read.conversion is None) == ("conversion" not in json.loads(path.read_text())["clip"])
+    assert (read.conversion is None) == ("conversion" not in clip)
     assert read.clip == {
         "name": clip["name"],
         "source": clip["source"],
@@ -90,7 +90,8 @@ def test_the_time_of_a_palette_hardly_grows_with_the_stops_of_an_edge() -> None:
             _core.edited_colours(read.polytope, read.edits, palette)
         return time.process_time() - start
 
-    assert seconds(20_000) < 8 * min(seconds(100) for _ in range(3))
+    # Windows counts in steps of 1/64 s.
+    assert seconds(20_000) < 8 * max(min(seconds(100) for _ in range(3)), 1 / 64)
 
 
 def test_versions_do_not_multiply_the_memory() -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from posix_files import modes
 
 from palette4d import _core, load
 from palette4d.cli import main
@@ -270,6 +271,7 @@ def test_in_a_process(edited: str) -> None:
     assert [entry["vertex"] for entry in edits_of(edited)["vertices"]] == ["v3", "v4", "v17"]
 
 
+@modes
 def test_a_read_only_folder(edited: str, capsys: pytest.CaptureFixture[str]) -> None:
     folder = Path(edited).parent
     folder.chmod(0o555)

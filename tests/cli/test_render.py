@@ -12,6 +12,7 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 from clip_files import grey_levels, write_image, write_movie
+from posix_files import links
 
 from palette4d import _core
 from palette4d.cli import render
@@ -256,6 +257,13 @@ def test_its_own_input_is_never_replaced(tmp_path):
     before = {p: p.read_bytes() for p in folder.iterdir()}
     with pytest.raises(Palette4dError, match="of the clip itself"):
         run(PLAIN, folder, "-o", folder / "clip.####.png", "--force")
+    assert {p: p.read_bytes() for p in folder.iterdir()} == before
+
+
+@links
+def test_its_own_input_is_not_replaced_through_a_link(tmp_path):
+    folder = grey_levels(tmp_path / "in", range(3))
+    before = {p: p.read_bytes() for p in folder.iterdir()}
     (tmp_path / "link").symlink_to(folder)
     with pytest.raises(Palette4dError, match="of the clip itself"):
         run(PLAIN, folder, "-o", tmp_path / "link" / "clip.%04d.png", "--force")
@@ -315,7 +323,7 @@ def test_folders_that_cannot_be_written_are_named(tmp_path):
     for folder in ("none", "file"):
         with pytest.raises(Palette4dError, match=r"o\.png"):
             write_frame(tmp_path / folder / "o.png", colours(2, 2, 3), "uint8")
-    if os.geteuid() != 0:  # root may write everywhere
+    if os.name == "posix" and os.geteuid() != 0:  # root may write everywhere
         (tmp_path / "locked").mkdir(mode=0o500)
         with pytest.raises(WriteError):
             write_frame(tmp_path / "locked" / "o.png", colours(2, 2, 3), "uint8")

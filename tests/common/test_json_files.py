@@ -5,6 +5,7 @@ import time
 from pathlib import Path
 
 import pytest
+from posix_files import pipes
 
 from palette4d.common import json_files
 from palette4d.common.json_files import UnusableFile, parse, read_json, read_regular
@@ -39,6 +40,7 @@ def test_what_is_in_texts_does_not_count() -> None:
     assert parse(text)["b"] == ["\N{GRINNING FACE}", 1500.0, 0]
 
 
+@pipes
 def test_what_is_no_regular_file_is_refused_at_once(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)

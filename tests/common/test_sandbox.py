@@ -78,6 +78,7 @@ def told(done: subprocess.CompletedProcess[str]) -> list[list[str]]:
     return [json.loads(line)["hostile"] for line in lines]
 
 
+@confines
 def test_without_a_sandbox_a_reader_may_do_all_of_it(home: Path) -> None:
     """Else the other tests could not fail."""
     shutil.copyfile(GOLDEN / "v2_picks.p4d.json", home / "own.p4d.json")

@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from posix_files import links, modes
 
 from palette4d import _core
 from palette4d.cli import install_plugin
@@ -75,6 +76,7 @@ def test_the_bundle_knows_which_python_has_palette4d(
     assert stat.S_IMODE((target / PROGRAM).stat().st_mode) == 0o644
 
 
+@modes
 def test_a_closed_umask_makes_no_closed_plugin(bundle: Path, tmp_path: Path) -> None:
     for path in (bundle, *bundle.rglob("*")):  # pip had the same umask
         path.chmod(0o700 if path.is_dir() else 0o600)
@@ -151,6 +153,7 @@ def test_links(bundle: Path, tmp_path: Path) -> None:
     assert files(target) == files(bundle)
 
 
+@links
 def test_a_link_that_leads_nowhere_is_replaced(bundle: Path, tmp_path: Path) -> None:
     destination = tmp_path / "OFX"
     destination.mkdir()

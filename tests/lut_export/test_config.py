@@ -15,6 +15,7 @@ from palette4d.lut_export import series
 from palette4d.lut_export.config import WrittenConfig, write_config
 from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.measured_write import BakeSettings
+from posix_files import links
 
 from palette4d import Palette4dError, _core
 from palette4d.colour.difference import delta_e_2000, viewing_of
@@ -320,6 +321,7 @@ class TestBase:
         assert any("TOKEN" in note for note in done.notes)
         assert "tulip" not in done.path.read_text("utf-8") + " ".join(done.notes)
 
+    @links
     def test_links_in_the_place_of_its_folders_lead_nowhere(
         self, shot: Path, tmp_path: Path
     ) -> None:

@@ -28,6 +28,7 @@ from edits import (
     timeline,
 )
 from opentimelineio.opentime import RationalTime
+from posix_files import pipes
 from without_module import run_without
 
 from palette4d.common.errors import Palette4dError
@@ -491,6 +492,7 @@ class TestHostile:
         with pytest.raises(Palette4dError, match="longer than 0 seconds"):
             timeline_clips.read(path)
 
+    @pipes
     def test_a_pipe(self, tmp_path: Path) -> None:
         os.mkfifo(tmp_path / "pipe.otio")
         with pytest.raises(Palette4dError, match="expected a file"):

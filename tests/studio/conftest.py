@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
@@ -46,7 +47,7 @@ def sidecar(analysed: Path, tmp_path: Path) -> Path:
     """The clip's sidecar, to be edited."""
     path = tmp_path / "clip.p4d.json"
     path.write_bytes((analysed / "clip.p4d.json").read_bytes())
-    (tmp_path / "clip").symlink_to(analysed / "clip")
+    shutil.copytree(analysed / "clip", tmp_path / "clip", copy_function=os.link)
     return path
 
 

@@ -45,7 +45,7 @@ def test_a_stopped_job_leaves_nothing(tmp_path: Path, analysed: Path) -> None:
 
 def test_an_error_names_the_fields_of_the_dialog(tmp_path: Path, analysed: Path) -> None:
     for number in (1, 2, 4):
-        (tmp_path / f"gap.{number}.png").symlink_to(analysed / "clip" / "frame.0001.png")
+        (tmp_path / f"gap.{number}.png").hardlink_to(analysed / "clip" / "frame.0001.png")
     job = Job(
         ["analyze", str(tmp_path / "gap.#.png"), "-o", str(tmp_path / "x.p4d.json")],
         lambda job: None,

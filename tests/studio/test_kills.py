@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import random
 import shutil
 import subprocess
@@ -88,7 +89,7 @@ def check(sidecar: Path, seed: int, *, promised: bool) -> None:
 def copied(sidecar: Path, folder: Path) -> Path:
     """Return a copy of a sidecar with its clip."""
     folder.mkdir()
-    (folder / "clip").symlink_to(sidecar.parent / "clip")
+    shutil.copytree(sidecar.parent / "clip", folder / "clip", copy_function=os.link)
     return Path(shutil.copy(sidecar, folder / "clip.p4d.json"))
 
 

@@ -93,7 +93,12 @@ Sidecar read_sidecar(const std::string& path) {
     namespace fs = std::filesystem;
     const char* const wanted = "a sidecar file (*.p4d.json)";
     std::error_code problem;
-    const fs::path native = fs::u8path(path);
+    fs::path native;
+    try {
+        native = fs::u8path(path);
+    } catch (const std::exception&) {  // Windows: not every text is a path
+        throw SidecarError(path, "", "an unreadable path (no valid UTF-8)", wanted);
+    }
     const fs::file_status status = fs::status(native, problem);
     if (!fs::exists(status)) {
         if (status.type() == fs::file_type::none) {
