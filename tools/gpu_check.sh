@@ -59,7 +59,7 @@ run() {
     {
         nvidia-smi --query-gpu=name,driver_version --format=csv,noheader 2>&1 || true
         status=0
-        for part in gpu_check_errors gpu_check_speed "gpu_ -gpu_check"; do
+        for part in gpu_check_errors gpu_check_clean_up gpu_check_speed "gpu_ -gpu_check"; do
             # shellcheck disable=SC2086
             timeout 180 $start "$test_program" "$folder/Palette4D.ofx.bundle" "$folder/work" $part 2>&1 ||
                 status=$?

@@ -35,6 +35,8 @@ def source() -> str:
         "picks",
         "sampled",
         "convert",
+        "colour",
+        "clean_up",
         "pixel",
     ]
     frame = "".join((KERNEL / f"{part}.inc").read_text(encoding="utf-8") for part in parts)

@@ -1,5 +1,6 @@
 // CUDA's driver interface: the host's stream, and pointers of the device in place of pixels.
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <utility>
 
@@ -54,16 +55,19 @@ const CudaFunctions* cuda_functions() {
 
 /// The kernel in a context.
 struct Module : Context {
-    Handle module = nullptr, function = nullptr;
+    Handle module = nullptr;
+    std::array<Handle, kKernels.size()> functions{};
 
     std::string load(const CudaFunctions& cu) {
-        if (function) return "";
+        if (functions.back()) return "";
         int error = cu.cuModuleLoadData(&module, cuda_ptx());
         if (error) return driver_error("cuModuleLoadData", error);
-        error = cu.cuModuleGetFunction(&function, module, "p4d_draw");
-        if (error) return driver_error("cuModuleGetFunction", error);
-        // What a device lacks shows when a table of that size is drawn.
-        cu.cuFuncSetAttribute(function, kMostShared, kMostTable * sizeof(float));
+        for (std::size_t i = 0; i < kKernels.size(); ++i) {
+            error = cu.cuModuleGetFunction(&functions[i], module, kKernels[i]);
+            if (error) return driver_error("cuModuleGetFunction", error);
+            // What a device lacks shows when a table of that size is drawn.
+            cu.cuFuncSetAttribute(functions[i], kMostShared, kMostTable * sizeof(float));
+        }
         return "";
     }
 };
@@ -163,18 +167,39 @@ private:
         Pointer in = address(window.in, window.in.start),
                 out = address(window.out, window.out.start), at = memory.at,
                 grids_at = memory.at + table;
+        void* kept = nullptr;
+        const std::string problem = scratch(frame, stream_, kept);
+        if (!problem.empty()) return problem;
         int size = static_cast<int>(frame.table.size());
         long long in_row = window.in.row / 4, out_row = window.out.row / 4;
         Window w = window;
-        void* arguments[] = {&in,      &out,      &at,   &grids_at, &size, &in_row, &out_row,
-                             &w.width, &w.height, &w.x1, &w.y1,     &w.x2, &w.y2};
-        const auto columns = static_cast<unsigned>(window.width + static_cast<int>(kThreads) - 1);
-        const auto rows = static_cast<unsigned>(window.height + static_cast<int>(kRows) - 1);
-        error = cu_.cuLaunchKernel(module_->function, columns / kThreads,
-                                   std::min(rows / kRows, 65535u), 1, kThreads, 1, 1,
-                                   static_cast<unsigned>(table), stream_, arguments, nullptr);
-        if (error) return driver_error("cuLaunchKernel", error);
+        void* arguments[] = {&in,      &out,     &at,       &grids_at, &kept, &size, &in_row,
+                             &out_row, &w.width, &w.height, &w.x1,     &w.y1, &w.x2, &w.y2};
+        for (const Pass& pass : passes_of(frame, window)) {
+            // Each block copies the table once, so that blocks of pixels have several rows.
+            const unsigned rows = pass.kernel + 1 < kKernels.size() ? 1 : kRows;
+            const unsigned width = static_cast<unsigned>(pass.width) + kThreads - 1;
+            const unsigned height = static_cast<unsigned>(pass.height) + rows - 1;
+            error = cu_.cuLaunchKernel(module_->functions[pass.kernel], width / kThreads,
+                                       std::min(height / rows, 65535u), 1, kThreads, 1, 1,
+                                       static_cast<unsigned>(table), stream_, arguments, nullptr);
+            if (error) return driver_error("cuLaunchKernel", error);
+        }
         return waits_ ? wait() : "";
+    }
+
+    /// Not of the stream, which may be gone when this is freed, while its context is current; or
+    /// with that.
+    std::shared_ptr<void> allocate(std::size_t bytes, std::string& problem) override {
+        Pointer at = 0;
+        const int error = cu_.cuMemAlloc_v2(&at, bytes);
+        if (error) {
+            problem = driver_error("cuMemAlloc", error);
+            return nullptr;
+        }
+        return {reinterpret_cast<void*>(at), [&cu = cu_, key = key_, at](void*) {
+                    if (current_context(cu) == key) cu.cuMemFree_v2(at);
+                }};
     }
 
     /// Freed while its context is current, or with it.

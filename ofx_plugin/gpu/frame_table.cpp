@@ -9,6 +9,7 @@
 #include "gpu/convert_table.hpp"
 #include "gpu/kernel/layout.inc"
 #include "model/vec3.hpp"
+#include "output/clean_up_kernels.hpp"
 #include "recolour/recolour.hpp"
 #include "recolour/recolour_plan.hpp"
 
@@ -191,6 +192,35 @@ void add_picks(const Recolourer& map, FrameTable& result) {
     }
 }
 
+void add_cells(const CleanUp::Place& place, double amount, FrameTable& result) {
+    static_assert(P4D_NOISE == static_cast<float>(kCleanUpNoise) && kCleanUpReach == 2);
+    const CleanUpCells cells = clean_up_cells(place);
+    result.columns = cells.column2 - cells.column1;
+    result.rows = cells.row2 - cells.row1;
+    if (result.columns <= 0 || result.rows <= 0) {
+        result.columns = result.rows = 0;
+        return;
+    }
+    const auto offset = [](std::int64_t from, std::int64_t to) {
+        return static_cast<double>(to - from);
+    };
+    const Area &window = place.drawn, &picture = place.picture, &source = cells.source;
+    result.table[P4D_CLEAN] = static_cast<float>(amount);
+    const double numbers[] = {
+        static_cast<double>(result.columns),
+        static_cast<double>(result.rows),
+        static_cast<double>(place.cell_width),
+        static_cast<double>(place.cell_height),
+        offset(picture.x1 + std::int64_t{cells.column1} * place.cell_width, window.x1),
+        offset(picture.y1 + std::int64_t{cells.row1} * place.cell_height, window.y1),
+        offset(window.x1, source.x1),
+        offset(window.y1, source.y1),
+        offset(window.x1, source.x2),
+        offset(window.y1, source.y2)};
+    float* to = &result.table[P4D_CELLS];
+    for (const double value : numbers) *to++ = static_cast<float>(value);
+}
+
 /// What moves colours: the edit, or a matte's reader. Null where nothing does.
 const Recolourer* map_of(const Drawing& drawing) {
     const Recolourer* const map =
@@ -231,15 +261,14 @@ std::string lacks(const Drawing& drawing) {
         if (!fits(*drawing.conversion)) return "a conversion beyond single precision";
         size += table_size(*drawing.conversion);
     }
-    if (size > kMostTable) return "a palette of that many handles";
-    const bool cleans = !options.is_matte() || options.output == Output::kPick;
-    if (cleans && options.clean_up > 0 && !map->picks().picks.empty()) {
-        return "the clean-up of picks";
-    }
-    return "";
+    return size > kMostTable ? "a palette of that many handles" : "";
 }
 
-FrameTable frame_table(const Drawing& drawing, bool premultiplied) {
+std::size_t FrameTable::scratch() const {
+    return P4D_PLANES * static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+}
+
+FrameTable frame_table(const Drawing& drawing, bool premultiplied, const CleanUp::Place* place) {
     const DrawingOptions& options = drawing.options;
     FrameTable result;
     std::vector<float>& table = result.table;
@@ -282,6 +311,7 @@ FrameTable frame_table(const Drawing& drawing, bool premultiplied) {
     }
     add_picks(*map, result);
     if (drawing.conversion) add_conversion(*drawing.conversion, result);
+    if (place && cleaned_map(drawing)) add_cells(*place, options.clean_up, result);
     return result;
 }
 

@@ -1,6 +1,7 @@
 // Metal: the host's queue, and buffers in place of pixels. Written from Apple's documentation, and
 // never run: no Mac was at hand.
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <cstring>
 
@@ -15,9 +16,10 @@ namespace {
 using Handle = ObjectiveC::Handle;
 using Size = std::size_t;  // NSUInteger
 
-constexpr long kFailed = 5;  // MTLCommandBufferStatusError
-constexpr Size kShared = 0;  // MTLResourceStorageModeShared
-constexpr Size kGroup = 64;  // threads of a group
+constexpr long kFailed = 5;        // MTLCommandBufferStatusError
+constexpr Size kShared = 0;        // MTLResourceStorageModeShared
+constexpr Size kPrivate = 2 << 4;  // MTLResourceStorageModePrivate
+constexpr Size kGroup = 64;        // threads of a group
 struct Extent {
     Size width, height, depth;
 };
@@ -62,14 +64,16 @@ std::string failed(const MetalFunctions& mt, const char* what, Handle error) {
 struct Pipeline : Context {
     const MetalFunctions& mt;
     const Owned device;  ///< kept, so that no other one gets its handle
-    Handle state = nullptr;
+    std::array<Handle, kKernels.size()> states{};
 
     Pipeline(const MetalFunctions& functions, Handle of)
         : mt(functions), device(functions, functions.send(of, "retain")) {}
-    ~Pipeline() { mt.send<void>(state, "release"); }
+    ~Pipeline() {
+        for (const Handle state : states) mt.send<void>(state, "release");
+    }
 
     std::string build() {
-        if (state) return "";
+        if (states.back()) return "";
         const auto string = [&](const char* text) {
             return mt.send(mt.objc_getClass("NSString"), "stringWithUTF8String:", text);
         };
@@ -79,12 +83,16 @@ struct Pipeline : Context {
         const Owned library(mt, mt.send(device.object, "newLibraryWithSource:options:error:",
                                         string(metal_text()), options.object, &error));
         if (!library.object) return failed(mt, "newLibraryWithSource", error);
-        const Owned function(mt,
-                             mt.send(library.object, "newFunctionWithName:", string("p4d_draw")));
-        if (!function.object) return "newFunctionWithName failed";
-        state = mt.send(device.object,
+        for (std::size_t i = 0; i < states.size(); ++i) {
+            const Owned function(
+                mt, mt.send(library.object, "newFunctionWithName:", string(kKernels[i])));
+            if (!function.object) return "newFunctionWithName failed";
+            states[i] =
+                mt.send(device.object,
                         "newComputePipelineStateWithFunction:error:", function.object, &error);
-        return state ? "" : failed(mt, "newComputePipelineStateWithFunction", error);
+            if (!states[i]) return failed(mt, "newComputePipelineStateWithFunction", error);
+        }
+        return "";
     }
 };
 
@@ -194,11 +202,15 @@ private:
         const Owned table(mt_, buffer(frame.table)), grids(mt_, buffer(frame.grids));
         const Handle work = mt_.send(queue_, "commandBuffer");
         if (!table.object || !grids.object) return "Metal has no memory for a frame's tables";
+        void* memory = window.out.data;  // where no kernel reads it
+        const std::string problem = scratch(frame, queue_, memory);
+        if (!problem.empty()) return problem;
+        // Its kernels run one after the other.
         const Handle encoder = mt_.send(work, "computeCommandEncoder");
         if (!encoder) return "Metal has no command buffer";
-        mt_.send<void>(encoder, "setComputePipelineState:", pipeline_->state);
         Size index = 0;
-        for (const Handle one : {window.in.data, window.out.data, table.object, grids.object}) {
+        for (const Handle one :
+             {window.in.data, window.out.data, table.object, grids.object, memory}) {
             mt_.send<void>(encoder, "setBuffer:offset:atIndex:", one, Size{0}, index++);
         }
         const auto floats = [](std::ptrdiff_t bytes) {
@@ -216,15 +228,25 @@ private:
                                         window.y2};
         mt_.send<void>(encoder, "setBytes:length:atIndex:", static_cast<const void*>(numbers),
                        sizeof numbers, index);
-        const Size threads =
-            std::min(kGroup, mt_.send<Size>(pipeline_->state, "maxTotalThreadsPerThreadgroup"));
-        const Extent group{threads, 1, 1};
-        const Extent groups{(static_cast<Size>(window.width) + threads - 1) / threads,
-                            static_cast<Size>(window.height), 1};
-        mt_.send<void>(encoder, "dispatchThreadgroups:threadsPerThreadgroup:", groups, group);
+        for (const Pass& pass : passes_of(frame, window)) {
+            const Handle state = pipeline_->states[pass.kernel];
+            mt_.send<void>(encoder, "setComputePipelineState:", state);
+            const Size threads =
+                std::min(kGroup, mt_.send<Size>(state, "maxTotalThreadsPerThreadgroup"));
+            const Extent group{threads, 1, 1};
+            const Extent groups{(static_cast<Size>(pass.width) + threads - 1) / threads,
+                                static_cast<Size>(pass.height), 1};
+            mt_.send<void>(encoder, "dispatchThreadgroups:threadsPerThreadgroup:", groups, group);
+        }
         mt_.send<void>(encoder, "endEncoding");
         mt_.send<void>(work, "commit");
         return "";
+    }
+
+    std::shared_ptr<void> allocate(std::size_t bytes, std::string& problem) override {
+        const Handle memory = mt_.send(device_, "newBufferWithLength:options:", bytes, kPrivate);
+        if (!memory) problem = "Metal has no memory for the clean-up of picks";
+        return {memory, [&mt = mt_](Handle of) { mt.send<void>(of, "release"); }};
     }
 
     const MetalFunctions& mt_;

@@ -1,4 +1,5 @@
 // OpenCL 1.1, as hosts have it: their queue, and buffers in place of pixels.
+#include <array>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -18,7 +19,8 @@ using Handle = void*;
 
 constexpr Uint kQueueContext = 0x1090, kQueueDevice = 0x1091;
 constexpr Uint kDeviceName = 0x102B, kDeviceMaxConstant = 0x1020;
-constexpr Bits kReadOnlyCopied = 1 << 2 | 1 << 5, kInHost = 1 << 4, kMapReadWrite = 1 | 1 << 1;
+constexpr Bits kReadOnlyCopied = 1 << 2 | 1 << 5, kOnDevice = 1 << 0, kInHost = 1 << 4;
+constexpr Bits kMapReadWrite = 1 | 1 << 1;
 constexpr Int kInvalidValue = -30;
 
 struct ClFunctions : Functions {
@@ -162,8 +164,24 @@ private:
         if (!table.memory) return driver_error("clCreateBuffer", error);
         const Buffer grids(cl_, context_, frame.grids, error);
         if (!grids.memory) return driver_error("clCreateBuffer", error);
+        void* memory = window.out.data;  // where no kernel reads it
+        std::string problem = scratch(frame, queue_, memory);
+        for (const Pass& pass : passes_of(frame, window)) {
+            if (problem.empty())
+                problem = enqueue(pass, window, {table.memory, grids.memory, memory});
+        }
+        if (!problem.empty()) return problem;
+        error = cl_.clFlush(queue_);
+        return error ? driver_error("clFlush", error) : "";
+    }
+
+    /// `buffers`: the table, the grids and what passes leave to each other.
+    std::string enqueue(const Pass& pass, const Window& window,
+                        const std::array<Handle, 3>& buffers) {
+        Int error = 0;
         // One for each draw: setting arguments is not thread-safe.
-        const Kernel kernel{cl_, cl_.clCreateKernel(program_->program, "p4d_draw", &error)};
+        const Kernel kernel{cl_,
+                            cl_.clCreateKernel(program_->program, kKernels[pass.kernel], &error)};
         if (!kernel.kernel) return driver_error("clCreateKernel", error);
         Uint index = 0;
         const auto set = [&](const auto& value) {
@@ -173,8 +191,7 @@ private:
         };
         set(window.in.data);
         set(window.out.data);
-        set(table.memory);
-        set(grids.memory);
+        for (const Handle buffer : buffers) set(buffer);
         for (const std::ptrdiff_t bytes :
              {window.in.start, window.in.row, window.out.start, window.out.row}) {
             set(static_cast<Int>(bytes / 4));
@@ -184,13 +201,33 @@ private:
             set(static_cast<Int>(value));
         }
         if (error) return driver_error("clSetKernelArg", error);
-        const std::size_t size[2] = {static_cast<std::size_t>(window.width + 63) / 64 * 64,
-                                     static_cast<std::size_t>(window.height)};
-        error = cl_.clEnqueueNDRangeKernel(queue_, kernel.kernel, 2, nullptr, size, nullptr, 0,
+        const std::size_t size[2] = {static_cast<std::size_t>(pass.width + 63) / 64 * 64,
+                                     static_cast<std::size_t>(pass.height)};
+        // The same for all sizes of pictures: drivers compile a kernel for each.
+        const std::size_t group[2] = {64, 1};
+        error = cl_.clEnqueueNDRangeKernel(queue_, kernel.kernel, 2, nullptr, size, group, 0,
                                            nullptr, nullptr);
-        if (error) return driver_error("clEnqueueNDRangeKernel", error);
-        error = cl_.clFlush(queue_);
-        return error ? driver_error("clFlush", error) : "";
+        return error ? driver_error("clEnqueueNDRangeKernel", error) : "";
+    }
+
+    std::shared_ptr<void> allocate(std::size_t bytes, std::string& problem) override {
+        Int error = 0;
+        const Handle memory = cl_.clCreateBuffer(context_, kOnDevice, bytes, nullptr, &error);
+        if (!memory) {
+            problem = driver_error("clCreateBuffer", error);
+            return nullptr;
+        }
+        // Kept, so that no other queue gets its handle.
+        error = cl_.clRetainCommandQueue(queue_);
+        if (error) {
+            cl_.clReleaseMemObject(memory);
+            problem = driver_error("clRetainCommandQueue", error);
+            return nullptr;
+        }
+        return {memory, [&cl = cl_, queue = queue_](Handle of) {
+                    cl.clReleaseMemObject(of);
+                    cl.clReleaseCommandQueue(queue);
+                }};
     }
 
     /// A mapped buffer, which drivers keep pinned.

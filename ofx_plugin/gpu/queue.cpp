@@ -13,7 +13,12 @@ std::string Queue::draw(const FrameTable& frame, const Window& window, double* t
     }
     std::string problem = took ? wait() : "";
     const auto start = std::chrono::steady_clock::now();
-    if (problem.empty()) problem = enqueue(frame, window);
+    if (problem.empty()) {
+        // The passes of a frame share memory: those of another thread must not come between.
+        std::unique_lock<std::mutex> lock(here->mutex, std::defer_lock);
+        if (frame.scratch() > 0) lock.lock();
+        problem = enqueue(frame, window);
+    }
     if (took && problem.empty()) problem = wait();
     if (took) {
         const std::chrono::duration<double, std::milli> time =
@@ -24,6 +29,29 @@ std::string Queue::draw(const FrameTable& frame, const Window& window, double* t
         const std::lock_guard<std::mutex> lock(here->mutex);
         here->problem = problem;
     }
+    return problem;
+}
+
+std::vector<Pass> passes_of(const FrameTable& frame, const Window& window) {
+    std::vector<Pass> passes;
+    for (std::size_t i = 0; i + 1 < kKernels.size() && frame.scratch() > 0; ++i) {
+        passes.push_back({i, frame.columns, frame.rows});
+    }
+    passes.push_back({kKernels.size() - 1, window.width, window.height});
+    return passes;
+}
+
+std::string Queue::scratch(const FrameTable& frame, const void* queue, void*& memory) {
+    const std::size_t bytes = frame.scratch() * sizeof(float);
+    if (bytes == 0) return "";
+    std::string problem;
+    Context::Scratch& kept = context()->scratch;
+    if (kept.queue != queue || kept.bytes < bytes) {
+        kept = {};
+        kept = {queue, bytes, allocate(bytes, problem)};
+    }
+    memory = kept.memory.get();
+    if (!memory) kept = {};
     return problem;
 }
 

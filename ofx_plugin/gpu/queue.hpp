@@ -2,11 +2,13 @@
 // are loaded at run time; without them there are no queues.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "gpu/frame_table.hpp"
 #include "gpu/library.hpp"
@@ -28,12 +30,28 @@ struct Window {
     int x1 = 0, y1 = 0, x2 = 0, y2 = 0;
 };
 
+/// The kernels, in the order in which they run.
+inline constexpr std::array<const char*, 4> kKernels = {"p4d_cells", "p4d_fits", "p4d_means",
+                                                        "p4d_draw"};
+/// One of them, and how many work items it takes.
+struct Pass {
+    std::size_t kernel;
+    int width, height;
+};
+std::vector<Pass> passes_of(const FrameTable& frame, const Window& window);
+
 /// What is kept for a context.
 struct Context {
     std::mutex mutex{};
     std::string problem{};  ///< a driver's error; after it the kernel is not asked again
     /// Pinned memory that no render uses, and its bytes: what a frame takes.
     std::pair<std::shared_ptr<char>, std::size_t> older{}, newer{};
+    /// The device's memory for what passes leave to each other, of the queue that used it last.
+    struct Scratch {
+        const void* queue = nullptr;
+        std::size_t bytes = 0;
+        std::shared_ptr<void> memory{};
+    } scratch{};
 };
 
 /// For one render, in one thread. Functions return what went wrong, or nothing.
@@ -61,6 +79,10 @@ protected:
     /// Makes the kernel ready; under the context's mutex.
     virtual std::string load() = 0;
     virtual std::string enqueue(const FrameTable& frame, const Window& window) = 0;
+    /// Sets the memory for a frame's passes. The context's mutex is held until they are enqueued.
+    std::string scratch(const FrameTable& frame, const void* queue, void*& memory);
+    /// The device's memory, until nothing uses it; null: `problem` says why.
+    virtual std::shared_ptr<void> allocate(std::size_t bytes, std::string& problem) = 0;
     /// Until all work is done.
     virtual std::string wait() = 0;
     /// Null where there is none.

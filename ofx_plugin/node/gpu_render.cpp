@@ -103,7 +103,8 @@ GpuRender::GpuRender(const Properties& arguments) {
 }
 
 std::string draw_by_kernel(gpu::Queue& queue, const Image* in, const Image& out,
-                           const OfxRectI& window, const NodeDrawing& drawing, double* took) {
+                           const OfxRectI& window, const NodeDrawing& drawing,
+                           const CleanUp::Place* place, double* took) {
     if (!is_float_rgba(out)) return "the kernel lacks pictures other than RGBA in float";
     if (!addressable(out) || (in && !addressable(*in))) return "the kernel lacks rows of this size";
     const std::string lacking = gpu::lacks(drawing);
@@ -126,7 +127,11 @@ std::string draw_by_kernel(gpu::Queue& queue, const Image* in, const Image& out,
         }
     }
     const bool premultiplied = in && in->premultiplied;
-    return queue.draw(gpu::frame_table(drawing, premultiplied), work, took);
+    const gpu::FrameTable frame = gpu::frame_table(drawing, premultiplied, place);
+    if (frame.scratch() > std::numeric_limits<std::int32_t>::max()) {
+        return "the kernel lacks pictures of this size";
+    }
+    return queue.draw(frame, work, took);
 }
 
 std::string words_of_time(double milliseconds) {

@@ -31,10 +31,11 @@ struct GpuRender {
     explicit GpuRender(const Properties& render_arguments);
 };
 
-/// Draws the window with the kernel; `in` is null for transparent black. Returns what kept it from
-/// that. `took` as in Queue::draw().
+/// Draws the window with the kernel; `in` is null for transparent black, and `place` is where it is
+/// cleaned up. Returns what kept it from that. `took` as in Queue::draw().
 std::string draw_by_kernel(gpu::Queue& queue, const Image* in, const Image& out,
-                           const OfxRectI& window, const NodeDrawing& drawing, double* took);
+                           const OfxRectI& window, const NodeDrawing& drawing,
+                           const CleanUp::Place* place, double* took);
 
 /// "1.7 ms", "34 ms"
 std::string words_of_time(double milliseconds);

@@ -83,15 +83,19 @@ struct Copied {
 
 Area area_of(const OfxRectI& rect) { return {rect.x1, rect.y1, rect.x2, rect.y2}; }
 
+/// Where a window of a source is cleaned up.
+CleanUp::Place clean_up_place(const Image& in, const OfxRectI& window, const Scale& scale) {
+    return {area_of(in.definition), area_of(in.bounds), area_of(window), clean_up_cell(scale.x),
+            clean_up_cell(scale.y)};
+}
+
 /// Filters what picks do in the window. The source should reach regions_of_interest() beyond it;
 /// where a host gives less, the filter sees what there is.
 std::shared_ptr<const CleanUp> cleaned_up(const Suites& suites, const Image& in,
                                           const OfxRectI& window, const NodeDrawing& drawing,
                                           const Scale& scale, const std::function<bool()>& stop) {
     const std::shared_ptr<CleanUp> clean_up =
-        make_clean_up(drawing, {in.channels, in.premultiplied},
-                      {area_of(in.definition), area_of(in.bounds), area_of(window),
-                       clean_up_cell(scale.x), clean_up_cell(scale.y)});
+        make_clean_up(drawing, {in.channels, in.premultiplied}, clean_up_place(in, window, scale));
     if (!clean_up) return nullptr;
     const auto read = [&](int y, int x1, int x2, float* space) -> const float* {
         if (in.depth == Depth::kFloat) return reinterpret_cast<const float*>(in.at(x1, y));
@@ -274,11 +278,14 @@ OfxStatus draw_there(const Suites& suites, OfxImageEffectHandle effect, const Pi
         const bool draws = plan.action == Action::kDraw;
         const NodeDrawing& drawing = draws ? plan.setup.drawing : kAsItIs;
         const Image* const in = plan.action == Action::kClear ? nullptr : &*pictures.in;
+        std::optional<CleanUp::Place> place;
+        if (in && draws) place = clean_up_place(*in, window, scale);
         double took = 0;
         const bool measures = draws && measures_gpu(effect);
-        problem = draws && pictures.brush ? "the kernel lacks the brush"
-                                          : draw_by_kernel(queue, in, pictures.out, window, drawing,
-                                                           measures ? &took : nullptr);
+        problem = draws && pictures.brush
+                      ? "the kernel lacks the brush"
+                      : draw_by_kernel(queue, in, pictures.out, window, drawing,
+                                       place ? &*place : nullptr, measures ? &took : nullptr);
         if (problem.empty()) {
             note_gpu_frame(effect, queue.device(), measures ? words_of_time(took) : "");
             if (plan.error) std::rethrow_exception(plan.error);

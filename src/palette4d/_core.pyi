@@ -363,8 +363,13 @@ def kernel_table(
     outside_at: float = 0.05,
     premultiplied: bool = False,
     conversion: ColourConversion | None = None,
+    clean_up: float = 0.0,
+    size: tuple[int, int] = (0, 0),
 ) -> tuple[F32, F32]:
-    """Return what the kernel reads for a frame: the table and the grids, both flat."""
+    """Return what the kernel reads for a frame: the table and the grids, both flat.
+
+    `size` : rows and columns of the picture that is cleaned up. Its first row is its lowest.
+    """
 
 def straight_colours(image: NDArray[np.float32], *, premultiplied: bool) -> F32:
     """Return the (h, w, 3) float32 colours of an image (h, w, 3 or 4), not multiplied by alpha.

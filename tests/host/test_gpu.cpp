@@ -209,8 +209,6 @@ TEST(gpu_what_the_kernel_lacks_is_drawn_on_the_processor) {
         layout.padding = 16;
         const Picture source = source_of(layout);
         const OfxRectI window = rect(0, 4, 33, 35);
-        node.compare(source, window, false);  // the clean-up of picks
-        node.set("cleanUp", 0.0);
         node.compare(source, window, true);
         node.set("output", 2);  // the palette in the picture
         node.compare(source, window, false);

@@ -46,6 +46,14 @@ std::vector<std::unique_ptr<Gpu>> gpus_to_check() {
 
 struct Checked : Ready {
     explicit Checked(const std::string& of) : Ready(of) { set("cleanUp", 0.0); }
+    const palette4d::ColourConversion* conversion() const {
+        return parsed.conversion ? &parsed.conversion->steps : nullptr;
+    }
+    Vec3 in_palette(const float* pixel) const {
+        const Vec3 colour{pixel[0], pixel[1], pixel[2]};
+        return conversion() ? conversion()->to_palette(colour) : colour;
+    }
+    bool picks() const { return !parsed.edits.picks.empty(); }
     bool by_kernel() {
         CHECK(instance->changed("", "", kOfxChangeTime) == kOfxStatOK);
         const std::string status = instance->text("status");
@@ -57,7 +65,8 @@ struct Checked : Ready {
 };
 
 /// Colours anywhere around the palette, and at 1e-8 to 1e-2 from its faces, edges and vertices.
-void fill_near(Picture& picture, const palette4d::Slice& slice) {
+void fill_near(Picture& picture, const Checked& node) {
+    const palette4d::Slice slice = palette4d::slice_at(node.parsed.polytope, 15);
     std::mt19937 random(3);
     std::uniform_real_distribution<double> any(-0.2, 1.2), share(0, 1);
     std::normal_distribution<double> away(0, 1);
@@ -75,6 +84,7 @@ void fill_near(Picture& picture, const palette4d::Slice& slice) {
                          (k / sum) * slice.rgb[static_cast<std::size_t>(face[2])] +
                          step * Vec3{away(random), away(random), away(random)};
             }
+            if (node.conversion()) colour = node.conversion()->to_clip(colour);
             for (std::size_t c = 0; c < 3; ++c)
                 picture.floats(x, y)[c] = static_cast<float>(colour[c]);
             picture.floats(x, y)[3] = 1;
@@ -102,7 +112,7 @@ TEST(gpu_check_errors) {
             const double frame = 15;
             const auto slice = palette4d::slice_at(node.parsed.polytope, frame);
             Picture source(layout), output(layout);
-            fill_near(source, slice);
+            fill_near(source, node);
             node.instance->gpu = gpu.get();
             // The host's time 0 is the clip's first frame.
             CHECK(node.instance->render(frame - static_cast<double>(node.parsed.clip.first),
@@ -118,23 +128,62 @@ TEST(gpu_check_errors) {
             palette4d::RecolourOptions options;
             options.precision = palette4d::Precision::kDouble;
             options.threads = 0;
+            options.conversion = node.conversion();
             const int width = layout.width(), height = layout.height();
             exact.apply({from.data(), width, height, 4, width * 16},
                         {expected.data(), width, height, 4, width * 16}, options);
             double worst = 0, sum = 0, moved = 0;
-            for (std::size_t i = 0; i < from.size(); ++i) {
-                const double error = std::abs(static_cast<double>(found[i]) - expected[i]);
-                worst = std::max(worst, std::isfinite(error) ? error : 1e9);
-                sum += error;
-                moved = std::max(moved, std::abs(static_cast<double>(expected[i]) - from[i]));
+            for (std::size_t i = 0; i < from.size(); i += 4) {
+                const Vec3 was = node.in_palette(&from[i]), is = node.in_palette(&found[i]),
+                           right = node.in_palette(&expected[i]);
+                for (std::size_t c = 0; c < 3; ++c) {
+                    const double error = std::abs(is[c] - right[c]);
+                    worst = std::max(worst, std::isfinite(error) ? error : 1e9);
+                    sum += error;
+                    moved = std::max(moved, std::abs(right[c] - was[c]));
+                }
             }
             char line[256];
             std::snprintf(line, sizeof line, "%-12s %-40s largest error %.2e, mean %.2e",
                           name_of(path).c_str(), gpu->device().c_str(), worst,
-                          sum / static_cast<double>(from.size()));
+                          sum / static_cast<double>(from.size() / 4 * 3));
             figure(line);
             CHECK(worst < 1e-4);
             CHECK(moved > 0.05);
+        }
+    }
+}
+
+TEST(gpu_check_clean_up) {
+    for (const std::string& path : sidecars_to_check()) {
+        Layout layout;
+        layout.bounds = rect(0, 0, 512, 384);
+        for (const auto& gpu : gpus_to_check()) {
+            Checked node(path);
+            if (!node.picks()) break;
+            node.set("cleanUp", 1.0);
+            Picture source(layout), here(layout), there(layout);
+            fill_near(source, node);
+            CHECK(node.instance->render(5, &source, here, layout.bounds) == kOfxStatOK);
+            node.instance->gpu = gpu.get();
+            CHECK(node.instance->render(5, &source, there, layout.bounds) == kOfxStatOK);
+            node.by_kernel();
+            double worst = 0;
+            for (int y = 0; y < 384; ++y) {
+                for (int x = 0; x < 512; ++x) {
+                    const Vec3 one = node.in_palette(here.floats(x, y)),
+                               two = node.in_palette(there.floats(x, y));
+                    for (std::size_t c = 0; c < 3; ++c) {
+                        const double error = std::abs(one[c] - two[c]);
+                        worst = std::max(worst, std::isfinite(error) ? error : 1e9);
+                    }
+                }
+            }
+            char line[256];
+            std::snprintf(line, sizeof line, "%-12s %-40s cleaned up, off the processor %.2e",
+                          name_of(path).c_str(), gpu->device().c_str(), worst);
+            figure(line);
+            CHECK(worst < 1e-4);
         }
     }
 }
@@ -147,7 +196,7 @@ TEST(gpu_check_speed) {
         bool filled = false;
         for (const auto& gpu : gpus_to_check()) {
             Checked node(path);
-            if (!filled) fill_near(source, palette4d::slice_at(node.parsed.polytope, 15));
+            if (!filled) fill_near(source, node);
             filled = true;
             std::map<const Picture*, void*> memory;
             for (Picture* picture : {&source, &output}) {
@@ -173,6 +222,9 @@ TEST(gpu_check_speed) {
             };
             const double still = measured([&](int) { draw(5); });
             const double playing = measured([&](int i) { draw(1 + i % 9 + 0.01 * i); });
+            node.set("cleanUp", 1.0);
+            const double cleaned = node.picks() ? measured([&](int) { draw(5); }) : 0;
+            node.set("cleanUp", 0.0);
             const auto copies = [&](int i) {
                 if (i % 10) return;  // some are enough
                 gpu->upload(memory[&source], source.rest(), source.rest_size());
@@ -187,11 +239,10 @@ TEST(gpu_check_speed) {
             node.by_kernel();
             char line[256];
             std::snprintf(line, sizeof line,
-                          "%-12s %-40s UHD %7.2f ms a frame, %7.2f through time, %7.2f with "
-                          "copies, %7.2f %s; "
-                          "the first %.0f ms",
-                          name_of(path).c_str(), gpu->device().c_str(), still, playing, copied,
-                          pinned, pins ? "of pinned memory" : "again", first);
+                          "%-12s %-40s UHD %7.2f ms a frame, %7.2f cleaned up, %7.2f through "
+                          "time, %7.2f with copies, %7.2f %s; the first %.0f ms",
+                          name_of(path).c_str(), gpu->device().c_str(), still, cleaned, playing,
+                          copied, pinned, pins ? "of pinned memory" : "again", first);
             figure(line);
             for (Picture* picture : {&source, &output}) {
                 if (pins) gpu->unpin(picture->rest());

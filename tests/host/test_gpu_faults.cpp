@@ -65,6 +65,7 @@ std::unique_ptr<Gpu> new_context() {
 }
 
 constexpr int kOutOfMemory = -4, kOutOfResources = -5, kBuildFailure = -11;
+constexpr int kErrors[] = {kOutOfMemory, kOutOfResources, kBuildFailure};
 constexpr OfxStatus kGpuFailed = 1002;
 
 /// Whether two pictures are within the promise of each other.
@@ -82,7 +83,8 @@ struct Faulty : Both {
     Layout layout{};
     Picture source{layout};
     std::vector<unsigned char> expected;
-    explicit Faulty(Gpu& on) : Both(on) {
+    /// With picks that are cleaned up, which takes all kernels.
+    explicit Faulty(Gpu& on) : Both(on, write("picks.p4d.json", text_with_picks())) {
         fill(source, 4, false);
         expected = draw(&source, layout, layout.bounds, nullptr);
     }
@@ -133,7 +135,8 @@ TEST(gpu_each_call_of_the_driver_refused_in_turn) {
         EXPECT(calls > 20, std::to_string(calls));
         long copied = 0, failed = 0;
         for (long call = 1; call <= calls; ++call) {
-            for (const int error : {kOutOfMemory, kOutOfResources, kBuildFailure}) {
+            for (long i = call % every(3); i < 3; i += every(3)) {
+                const int error = kErrors[i];
                 const auto fresh = new_context();
                 Picture output(node.layout);
                 g_faults.set(call, error, false);
@@ -157,9 +160,9 @@ TEST(gpu_each_call_of_the_driver_refused_in_turn) {
                 CHECK(node.right(*gpu));
             }
         }
-        figure(std::to_string(3 * calls) + " refusals: " + std::to_string(copied) +
+        figure(std::to_string(calls) + " calls refused: " + std::to_string(copied) +
                " pictures were copied, " + std::to_string(failed) + " without a queue failed");
-        CHECK(copied >= 3 * 20);
+        CHECK(copied >= 20);
         CHECK(failed <= 3 * 4);
     }
     CHECK(g_faults.alive() == 0);
@@ -204,7 +207,7 @@ TEST(gpu_a_lost_device) {
     {
         Faulty node(*gpu);
         const long calls = node.calls_of_renders().first;
-        for (long call = 1; call <= calls; ++call) {
+        for (long call = 1; call <= calls; call += every(3)) {
             const auto fresh = new_context();
             if (call % 2) node.right(*fresh);  // lost at a later frame
             g_faults.set(call, kOutOfResources, true);
@@ -264,8 +267,8 @@ TEST(gpu_memory_stays_flat) {
         for (long i = 0; i < contexts; ++i) {
             const auto fresh = new_context();
             CHECK(node.right(*fresh));
-            // A program and its context.
-            EXPECT(g_faults.alive() <= 2 * 8, std::to_string(g_faults.alive()));
+            // A program and its context, the passes' memory and its queue.
+            EXPECT(g_faults.alive() <= 4 * 8, std::to_string(g_faults.alive()));
         }
         figure(std::to_string(frames) + " frames: " + std::to_string(grown / 1024) + " KB more; " +
                std::to_string(contexts) + " contexts: " + std::to_string(g_faults.alive()) +

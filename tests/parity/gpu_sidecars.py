@@ -1,4 +1,7 @@
-"""Write the sidecars that gpu_check.sh draws: 8, 12 and 16 vertices, with 3 picks or none."""
+"""Write the sidecars that gpu_check.sh draws: 8, 12 and 16 vertices, with 3 picks or none.
+
+And one with picks whose clip is scene-linear light.
+"""
 
 from __future__ import annotations
 
@@ -30,6 +33,21 @@ def sidecar(points: int) -> Document:
     return edited(document(vertices, edges, [block], []), moved, [], ramp="smooth")
 
 
+def in_light(document: Document) -> Document:
+    """The same palette of a clip in another space: a matrix, a power, and a sampled curve."""
+    x = np.linspace(-1, 2, 4096)
+    matrix = [[1.66, -0.59, -0.07], [-0.12, 1.13, -0.01], [-0.02, -0.1, 1.12]]
+    steps = [
+        {"kind": "matrix", "matrix": matrix, "offset": [0, 0, 0]},
+        {"kind": "gamma", "direction": "inverse", "gamma": [2.4] * 3, "offset": [0.055] * 3,
+         "negative": "line"},
+        {"kind": "curve", "direction": "forward",
+         "curves": [{"x": x.tolist(), "y": (0.9 * x + 0.1 * np.sin(x)).tolist()}]},
+    ]  # fmt: skip
+    conversion = {"input_space": "light", "config": "check", "error": 0, "steps": steps}
+    return {**document, "clip": {**document["clip"], "conversion": conversion}}
+
+
 def main(folder: Path) -> None:
     """Write them into a folder."""
     picks = [
@@ -45,6 +63,8 @@ def main(folder: Path) -> None:
         ):
             path = folder / f"{name}.p4d.json"
             path.write_text(json.dumps(written), encoding="utf-8")
+    light = in_light(picked(sidecar(8), picks))
+    (folder / "08_light.p4d.json").write_text(json.dumps(light), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -23,16 +23,33 @@
 #define P4D_LOG2 std::log2
 #define P4D_EXP2 std::exp2
 #define P4D_POW std::pow
+#define P4D_SOURCE const float *in_, int row_,
+#define P4D_IN(x, y, c) in_[(y) * row_ + 4 * (x) + (c)]
+#define P4D_SCRATCH [[maybe_unused]] float *s_,
+#define P4D_SCRATCH_PASS s_,
+#define P4D_CELL(i) s_[i]
 #include PALETTE4D_KERNEL
 
-extern "C" void draw(const float* table, const float* grids, const float* in, float* out,
-                     long pixels, int channels) {
-    for (; pixels > 0; --pixels, in += channels, out += channels) {
+/// An image of RGBA pixels; `scratch` has room for the planes of the table's cells.
+extern "C" void draw(const float* table, const float* grids, float* scratch, const float* in,
+                     float* out, int width, int height) {
+    const int columns = static_cast<int>(table[P4D_CELLS]);
+    const int rows = static_cast<int>(table[P4D_CELLS + 1]), row = 4 * width;
+    for (int i = 0; i < columns * rows; ++i) {
+        p4d_sum_cell(table, grids, in, row, scratch, i % columns, i / columns);
+    }
+    for (int i = 0; i < columns * rows; ++i) {
+        p4d_fit_cell(table, grids, scratch, i % columns, i / columns);
+    }
+    for (int i = 0; i < columns * rows; ++i) {
+        p4d_smooth_cell(table, grids, scratch, i % columns, i / columns);
+    }
+    for (int i = 0; i < width * height; ++i, in += 4, out += 4) {
         const p4d_rgba c =
-            p4d_pixel(table, grids, in[0], in[1], in[2], channels == 4 ? in[3] : 1.0f);
+            p4d_pixel(table, grids, scratch, in[0], in[1], in[2], in[3], i % width, i / width);
         out[0] = c.r;
         out[1] = c.g;
         out[2] = c.b;
-        if (channels == 4) out[3] = c.a;
+        out[3] = c.a;
     }
 }

@@ -44,26 +44,24 @@ def library(part: str = "frame") -> ctypes.CDLL:
         return ctypes.CDLL(str(made))
 
 
-def draw(image: F32, recolourer: _core.Recolourer, **options: Any) -> F32:
+def draw(image: F32, recolourer: _core.Recolourer, part: str = "frame", **options: Any) -> F32:
     """What the kernel draws; `options` of `_core.kernel_table`."""
-    table, grids = _core.kernel_table(recolourer, **options)
-    source = np.ascontiguousarray(image)
+    height, width, channels = image.shape
+    table, grids = _core.kernel_table(recolourer, size=(height, width), **options)
+    source = np.ones((height, width, 4), np.float32)
+    source[..., :channels] = image[::-1]
     result = np.empty_like(source)
-    pixels, channels = source.size // source.shape[-1], source.shape[-1]
-    pointers = [ctypes.c_void_p(a.ctypes.data) for a in (table, grids, source, result)]
-    library().draw(*pointers, ctypes.c_long(pixels), ctypes.c_int(channels))
-    return result
+    # 34 planes of cells of 4 x 4 pixels.
+    scratch = np.full(34 * (-(-height // 4)) * (-(-width // 4)), np.nan, np.float32)
+    arrays = table, grids, scratch, source, result
+    pointers = [ctypes.c_void_p(a.ctypes.data) for a in arrays]
+    library(part).draw(*pointers, ctypes.c_int(width), ctypes.c_int(height))
+    return np.ascontiguousarray(result[::-1, :, :channels])
 
 
 def draw_by_metal(image: F32, recolourer: _core.Recolourer, **options: Any) -> F32:
     """What the kernel for Metal draws; the source lacks the first and the last column."""
-    table, grids = _core.kernel_table(recolourer, **options)
-    source = np.ascontiguousarray(image)
-    result = np.empty_like(source)
-    pointers = [ctypes.c_void_p(a.ctypes.data) for a in (table, grids, source, result)]
-    height, width, _ = source.shape
-    library("metal").draw(*pointers, ctypes.c_int(width), ctypes.c_int(height))
-    return result
+    return draw(image, recolourer, "metal", **options)
 
 
 class Kernel(Core):

@@ -7,10 +7,12 @@ import importlib.util
 import json
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from parity import test_clean_up
 from parity.cases import (
     BODIES,
     DOCUMENTS,
@@ -245,13 +247,71 @@ def test_the_kernel_says_which_conversions_it_lacks() -> None:
         draw(light(), recolourer, conversion=conversion)
 
 
+@pytest.mark.parametrize("size", [(64, 96), (37, 51), (3, 5), (1, 1), (9, 130)])
+@pytest.mark.parametrize("amount", [1.0, 0.3])
+@pytest.mark.parametrize("moves", [False, True])
+def test_picks_are_cleaned_up_as_in_the_core(
+    size: tuple[int, int], amount: float, moves: bool
+) -> None:
+    image = test_clean_up.picture(*size)
+    image[1:3, 2:5] *= 20
+    image[3:5, 2:5] -= 3
+    image[30:31, 30:34, 1] = np.nan
+    recolourer = test_clean_up.recolourer(moves=moves)
+    expected = _core.draw(image, "recoloured", recolourer, clean_up=amount)
+    found = draw(image, recolourer, clean_up=amount)
+    np.testing.assert_allclose(found, expected, rtol=GOAL, atol=GOAL / 4)
+    untouched = same_bits(expected, image)
+    assert same_bits(found, image)[untouched].all()
+    plain = draw(image, recolourer)
+    assert np.nanmax(np.abs(plain - found)) > 0.02 * amount or min(size) < 9
+
+
+@pytest.mark.parametrize("output", ["recoloured", "pick"])
+@pytest.mark.parametrize("converts", [False, True])
+@pytest.mark.parametrize("premultiplied", [False, True])
+def test_pictures_with_alpha_are_cleaned_up(
+    output: str, converts: bool, premultiplied: bool
+) -> None:
+    image = np.ones((60, 90, 4), np.float32)
+    image[..., :3] = test_clean_up.picture(60, 90)
+    image[..., 3] = np.random.default_rng(1).uniform(0.2, 1, image.shape[:2])
+    image[20:24, 30:40, 3] = 0
+    options: dict[str, Any] = {"output": output, "premultiplied": premultiplied, "clean_up": 1.0}
+    conversion = _core.ColourConversion(json.dumps(CONVERSIONS["scene_linear"]))
+    if converts:
+        options["conversion"] = conversion
+        image[..., :3] = conversion.to_clip(image[..., :3].reshape(-1, 3)).reshape(60, 90, 3)
+    if premultiplied:
+        image[..., :3] *= image[..., 3:]
+    recolourer = test_clean_up.recolourer()
+    if output == "pick":
+        recolourer = reader("still-learned", 7.0, "pick")
+    elif not converts:
+        options |= {"keep_lightness": 0.3, "lightness": [0.2126, 0.7152, 0.0722]}
+    expected = _core.draw(image, map=recolourer, **options)
+    found = draw(image, recolourer, **options)
+    if converts and output == "recoloured":
+        some = image[..., 3] > 0
+        alpha = image[some, 3:].astype(float) if premultiplied else 1
+        there = [conversion.to_palette(a[some, :3] / alpha) for a in (found, expected)]
+        np.testing.assert_allclose(there[0], there[1], atol=GOAL)
+    else:
+        np.testing.assert_allclose(found, expected, atol=GOAL)
+    untouched = same_bits(expected, image)
+    assert same_bits(found, image)[untouched].all()
+    assert not np.array_equal(found, draw(image, recolourer, **options | {"clean_up": 0.0}))
+
+
 @pytest.mark.parametrize("name", ["changes", "still-learned"])
-def test_the_kernel_for_metal_draws_the_same(name: str) -> None:
+@pytest.mark.parametrize("clean_up", [0.0, 0.7])
+def test_the_kernel_for_metal_draws_the_same(name: str, clean_up: float) -> None:
     recolourer = Core("single").recolourer(DOCUMENTS[name], 7.0)
     image = picture(4)
-    expected = draw(image, recolourer, premultiplied=True)
+    options = {"premultiplied": True, "clean_up": clean_up}
+    expected = draw(image, recolourer, **options)
     expected[:, [0, -1]] = 0
-    found = draw_by_metal(image, recolourer, premultiplied=True)
+    found = draw_by_metal(image, recolourer, **options)
     np.testing.assert_allclose(found, expected, **FAST_TOLERANCE)
     assert (found[:, 1:-1] != image[:, 1:-1]).any() == (name != "changes")
 

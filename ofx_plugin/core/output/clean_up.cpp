@@ -316,6 +316,35 @@ private:
     std::vector<float> space_;
 };
 
+CleanUpCells clean_up_cells(const CleanUp::Place& place) {
+    CleanUpCells cells;
+    // Hosts may hand over more than the picture: what lies beyond does not count.
+    const Area inside = common(place.source, place.picture);
+    const Area source = is_empty(inside) ? place.source : inside;
+    cells.source = source;
+    const Area drawn = common(place.drawn, source);
+    const std::int64_t left = place.picture.x1, bottom = place.picture.y1;
+    const auto region = [](std::int64_t source1, std::int64_t source2, std::int64_t drawn1,
+                           std::int64_t drawn2, int cell) {
+        const auto [all1, all2] = cells_of(source1, source2, cell);
+        const std::int64_t below = between(drawn1, cell).node - 2 * kAround;
+        const std::int64_t above = between(drawn2 - 1, cell).node + 2 + 2 * kAround;
+        return std::make_pair(static_cast<int>(std::max<std::int64_t>(all1, below)),
+                              static_cast<int>(std::min<std::int64_t>(all2, above)));
+    };
+    if (is_empty(drawn)) return cells;
+    std::tie(cells.column1, cells.column2) = region(
+        source.x1 - left, source.x2 - left, drawn.x1 - left, drawn.x2 - left, place.cell_width);
+    std::tie(cells.row1, cells.row2) =
+        region(source.y1 - bottom, source.y2 - bottom, drawn.y1 - bottom, drawn.y2 - bottom,
+               place.cell_height);
+    const std::int64_t low = between(drawn.y1 - bottom, place.cell_height).node;
+    const std::int64_t high = between(drawn.y2 - 1 - bottom, place.cell_height).node + 2;
+    cells.first = static_cast<int>(std::max<std::int64_t>(cells.row1, low));
+    cells.last = static_cast<int>(std::min<std::int64_t>(cells.row2, high));
+    return cells;
+}
+
 CleanUp::CleanUp(std::shared_ptr<const Recolourer> map,
                  std::shared_ptr<const ColourConversion> conversion, double amount, Format format,
                  const Place& place)
@@ -328,29 +357,14 @@ CleanUp::CleanUp(std::shared_ptr<const Recolourer> map,
       set_picks_(kernels_of<PickKernels>(InstructionSet::kBest).set),
       place_(place),
       cells_(kInBlock / place.cell_width) {
-    // Hosts may hand over more than the picture: what lies beyond does not count.
-    const Area inside = common(place.source, place.picture);
-    if (!is_empty(inside)) place_.source = inside;
-    const Area& source = place_.source;
-    const Area drawn = common(place.drawn, source);
-    const std::int64_t left = place.picture.x1, bottom = place.picture.y1;
-    const auto region = [](std::int64_t source1, std::int64_t source2, std::int64_t drawn1,
-                           std::int64_t drawn2, int cell) {
-        const auto [all1, all2] = cells_of(source1, source2, cell);
-        const std::int64_t below = between(drawn1, cell).node - 2 * kAround;
-        const std::int64_t above = between(drawn2 - 1, cell).node + 2 + 2 * kAround;
-        return std::make_pair(static_cast<int>(std::max<std::int64_t>(all1, below)),
-                              static_cast<int>(std::min<std::int64_t>(all2, above)));
-    };
-    if (is_empty(drawn)) return;
-    std::tie(column1_, column2_) = region(source.x1 - left, source.x2 - left, drawn.x1 - left,
-                                          drawn.x2 - left, place.cell_width);
-    std::tie(row1_, row2_) = region(source.y1 - bottom, source.y2 - bottom, drawn.y1 - bottom,
-                                    drawn.y2 - bottom, place.cell_height);
-    const std::int64_t low = between(drawn.y1 - bottom, place.cell_height).node;
-    const std::int64_t high = between(drawn.y2 - 1 - bottom, place.cell_height).node + 2;
-    first_ = static_cast<int>(std::max<std::int64_t>(row1_, low));
-    last_ = static_cast<int>(std::min<std::int64_t>(row2_, high));
+    const CleanUpCells region = clean_up_cells(place);
+    place_.source = region.source;
+    column1_ = region.column1;
+    column2_ = region.column2;
+    row1_ = region.row1;
+    row2_ = region.row2;
+    first_ = region.first;
+    last_ = region.last;
     rows_.resize(static_cast<std::size_t>(last_ - first_));
     for (int k = 0; k < place.cell_width; ++k) {
         parts_.push_back(between(place.cell_width / 2 + k, place.cell_width).part);

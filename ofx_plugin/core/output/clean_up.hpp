@@ -91,4 +91,12 @@ private:
     std::vector<float> parts_;
 };
 
+/// The cells of a place, counted from the picture's lower left corner.
+struct CleanUpCells {
+    Area source{};                                     ///< the part of it that counts
+    int column1 = 0, column2 = 0, row1 = 0, row2 = 0;  ///< that are summed; none: nothing is drawn
+    int first = 0, last = 0;                           ///< rows that are drawn from
+};
+CleanUpCells clean_up_cells(const CleanUp::Place& place);
+
 }  // namespace palette4d

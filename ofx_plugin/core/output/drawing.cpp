@@ -235,8 +235,7 @@ void draw_converted(const ConstImageView& in, const ImageView& out, bool premult
 
 }  // namespace
 
-std::shared_ptr<CleanUp> make_clean_up(const Drawing& drawing, CleanUp::Format format,
-                                       const CleanUp::Place& place) {
+std::shared_ptr<const Recolourer> cleaned_map(const Drawing& drawing) {
     const DrawingOptions& options = drawing.options;
     const bool matte = options.output == Output::kPick;
     const std::shared_ptr<const Recolourer>& map = matte ? drawing.reader : drawing.edit;
@@ -244,7 +243,15 @@ std::shared_ptr<CleanUp> make_clean_up(const Drawing& drawing, CleanUp::Format f
         map->picks().picks.empty() || (!matte && options.strength == 0)) {
         return nullptr;
     }
-    return std::make_shared<CleanUp>(map, drawing.conversion, options.clean_up, format, place);
+    return map;
+}
+
+std::shared_ptr<CleanUp> make_clean_up(const Drawing& drawing, CleanUp::Format format,
+                                       const CleanUp::Place& place) {
+    const std::shared_ptr<const Recolourer> map = cleaned_map(drawing);
+    if (!map) return nullptr;
+    return std::make_shared<CleanUp>(map, drawing.conversion, drawing.options.clean_up, format,
+                                     place);
 }
 
 void draw_edit(const ConstImageView& in, const ImageView& out, bool premultiplied,

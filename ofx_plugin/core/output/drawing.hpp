@@ -73,8 +73,9 @@ struct Pixels {
     RowPlace place{};  ///< for Drawing::clean_up only
 };
 
-/// The filter of a drawing, before CleanUp::prepare(); null where no pick is drawn, or none is
-/// cleaned up.
+/// What the picks that are drawn and cleaned up are of; null where there are none.
+std::shared_ptr<const Recolourer> cleaned_map(const Drawing& drawing);
+/// The filter of a drawing, before CleanUp::prepare(); null where there is nothing to clean up.
 std::shared_ptr<CleanUp> make_clean_up(const Drawing& drawing, CleanUp::Format format,
                                        const CleanUp::Place& place);
 /// Draws the edit alone, row by row, whatever gaps are between rows; copies where there is no edit.

@@ -18,15 +18,38 @@
 #define P4D_LOG2 metal::log2
 #define P4D_EXP2 metal::exp2
 #define P4D_POW metal::pow
+#define P4D_SOURCE device const float *in_, int row_,
+#define P4D_IN(x, y, c) in_[(y) * row_ + 4 * (x) + (c)]
+#define P4D_SCRATCH device float *s_,
+#define P4D_SCRATCH_PASS s_,
+#define P4D_CELL(i) s_[i]
 @P4D_FRAME@
-struct p4d_window { int in_start, in_row, out_start, out_row, width, height, x1, y1, x2, y2; };
+struct p4d_image { int in_start, in_row, out_start, out_row, width, height, x1, y1, x2, y2; };
 
 /* As in opencl.cl. */
-kernel void p4d_draw(device const float *in [[buffer(0)]], device float *out [[buffer(1)]],
-                     constant const float *table [[buffer(2)]],
-                     device const float *grids [[buffer(3)]],
-                     constant const p4d_window &w [[buffer(4)]],
-                     uint2 at [[thread_position_in_grid]]) {
+#define P4D_ARGUMENTS                                                                              \
+    device const float *in [[buffer(0)]], device float *out [[buffer(1)]],                         \
+        constant const float *table [[buffer(2)]], device const float *grids [[buffer(3)]],        \
+        device float *scratch [[buffer(4)]], constant const p4d_image &w [[buffer(5)]],            \
+        uint2 at [[thread_position_in_grid]]
+#define P4D_IS_CELL(x, y) (x < int(table[P4D_CELLS]) && y < int(table[P4D_CELLS + 1]))
+
+kernel void p4d_cells(P4D_ARGUMENTS) {
+    int x = int(at.x), y = int(at.y);
+    if (P4D_IS_CELL(x, y)) p4d_sum_cell(table, grids, in + w.in_start, w.in_row, scratch, x, y);
+}
+
+kernel void p4d_fits(P4D_ARGUMENTS) {
+    int x = int(at.x), y = int(at.y);
+    if (P4D_IS_CELL(x, y)) p4d_fit_cell(table, grids, scratch, x, y);
+}
+
+kernel void p4d_means(P4D_ARGUMENTS) {
+    int x = int(at.x), y = int(at.y);
+    if (P4D_IS_CELL(x, y)) p4d_smooth_cell(table, grids, scratch, x, y);
+}
+
+kernel void p4d_draw(P4D_ARGUMENTS) {
     int x = int(at.x), y = int(at.y);
     if (x >= w.width || y >= w.height) return;
     device float *to = out + w.out_start + y * w.out_row + 4 * x;
@@ -34,7 +57,7 @@ kernel void p4d_draw(device const float *in [[buffer(0)]], device float *out [[b
     c.r = c.g = c.b = c.a = 0.0f;
     if (x >= w.x1 && x < w.x2 && y >= w.y1 && y < w.y2) {
         device const float *from = in + w.in_start + y * w.in_row + 4 * x;
-        c = p4d_pixel(table, grids, from[0], from[1], from[2], from[3]);
+        c = p4d_pixel(table, grids, scratch, from[0], from[1], from[2], from[3], x, y);
     }
     to[0] = c.r;
     to[1] = c.g;
