@@ -244,8 +244,8 @@ def _usable(
         )
     notes = []
     if blank := sorted(n for n, s in gathered.items() if s is None):
-        one, more = "frame has no usable pixel and was", "frames have no usable pixel and were"
-        notes.append(f"{counted(len(blank), one, more)} left out: {describe(blank)}")
+        single, more = "frame has no usable pixel and was", "frames have no usable pixel and were"
+        notes.append(f"{counted(len(blank), single, more)} left out: {describe(blank)}")
     for end, nearest in ((numbers[0], min(have)), (numbers[-1], max(have))):
         if end not in have:
             have[end] = dataclasses.replace(have[nearest], frame=end)

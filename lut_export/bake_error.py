@@ -68,21 +68,21 @@ def load(path: Path, readings: Iterable[str]) -> dict[str, Reader]:
 
     # OpenColorIO caches files by name: drop an earlier file of this name.
     ocio.ClearAllCaches()
-    found: dict[str, Reader] = {}
+    readers: dict[str, Reader] = {}
     for name in readings:
         setter, value = READINGS[name]
         transform = ocio.FileTransform(src=str(path.absolute()))
         getattr(transform, setter)(getattr(ocio, value))
         try:
             # An empty context: the environment would replace "$HOME" in a folder's name.
-            found[name] = ExactProcessor(
+            readers[name] = ExactProcessor(
                 ocio.Config.CreateRaw().getProcessor(
                     ocio.Context(), transform, ocio.TRANSFORM_DIR_FORWARD
                 )
             )
         except failures() as error:
             raise Palette4dError(f"{path}: OpenColorIO cannot read it: {error}") from error
-    return found
+    return readers
 
 
 @dataclass(frozen=True)
@@ -210,11 +210,11 @@ def largest_delta_e(
     if not len(pixels):
         return DeltaE(0.0, 0.0, 0.0)
     lab = viewing.lab(aims)
-    found = [delta_e_2000(lab, viewing.lab(reader(pixels))) for reader in readers.values()]
+    errors = [delta_e_2000(lab, viewing.lab(reader(pixels))) for reader in readers.values()]
     return DeltaE(
-        max(float(e.mean()) for e in found),
-        max(float(np.quantile(e, 0.99, method="higher")) for e in found),
-        max(float(e.max()) for e in found),
+        max(float(e.mean()) for e in errors),
+        max(float(np.quantile(e, 0.99, method="higher")) for e in errors),
+        max(float(e.max()) for e in errors),
     )
 
 
@@ -258,8 +258,8 @@ def _compare(
         delta_e = delta_e_2000(lab, viewing.lab(got[::stride]))
         visible[i] = (delta_e > VISIBLE).sum()
         all_delta_e[i] = delta_e
-        for k, found in enumerate((absolute, relative, delta_e)):
-            sums[i, k], maxima[i, k] = found.sum(), found.max()
+        for k, errors in enumerate((absolute, relative, delta_e)):
+            sums[i, k], maxima[i, k] = errors.sum(), errors.max()
     return _Part(len(colours), len(lab), outside, sums, maxima, visible, all_delta_e)
 
 

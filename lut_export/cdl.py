@@ -88,8 +88,8 @@ def fit(edit: FrameEdit, colours: F32) -> Cdl:
     # The standard forbids negative slope, power and saturation; powers near 0 make steps.
     low = np.array([0.0] * 3 + [-10.0] * 3 + [0.1] * 3 + [0.0])
     high = np.array([100.0] * 3 + [10.0] * 3 + [10.0] * 3 + [10.0])
-    found = least_squares(residual, start, bounds=(low, high), max_nfev=200)
-    rounded = [round(float(value), DIGITS) + 0.0 for value in found.x]
+    solution = least_squares(residual, start, bounds=(low, high), max_nfev=200)
+    rounded = [round(float(value), DIGITS) + 0.0 for value in solution.x]
     return Cdl(_triple(rounded[0:3]), _triple(rounded[3:6]), _triple(rounded[6:9]), rounded[9])
 
 
@@ -128,16 +128,16 @@ def read(path: Path) -> Cdl:
     import PyOpenColorIO as ocio
 
     try:
-        found: Any = ocio.CDLTransform.CreateFromFile(str(path), "")
+        transform: Any = ocio.CDLTransform.CreateFromFile(str(path), "")
     except ocio.Exception as error:
         raise Palette4dError(
             f"{path}: no CDL can be read ({error}); export it again with {Arg('force', True)}"
         ) from error
     return Cdl(
-        _triple(found.getSlope()),
-        _triple(found.getOffset()),
-        _triple(found.getPower()),
-        float(found.getSat()),
+        _triple(transform.getSlope()),
+        _triple(transform.getOffset()),
+        _triple(transform.getPower()),
+        float(transform.getSat()),
     )
 
 
@@ -163,4 +163,4 @@ def _text(transforms: list[Any], format_name: str) -> str:
 
 def _rounded(numbers: re.Match[str]) -> str:
     """Return numbers without the last digits, which are only rounding of binary floats."""
-    return " ".join(f"{float(one):.9g}" for one in numbers[0].split())
+    return " ".join(f"{float(number):.9g}" for number in numbers[0].split())

@@ -84,7 +84,7 @@ def _matrix(name: str, matrix: Any, offset: Any) -> str:
     """Return a function of a matrix and an offset."""
     rows = [
         f"    m.{to} = "
-        + " + ".join(f"{number(x)} * c.{of}" for x, of in zip(row, "rgb", strict=True))
+        + " + ".join(f"{number(x)} * c.{channel}" for x, channel in zip(row, "rgb", strict=True))
         + f" + {number(more)};"
         for to, row, more in zip("rgb", matrix, offset, strict=True)
     ]
@@ -97,8 +97,8 @@ def _curves(name: str, channels: Sequence[str]) -> str:
     bodies = list(dict.fromkeys(channels))
     texts = [f"P4D_FN float {name}_{i}(float x) {{\n{body}\n}}" for i, body in enumerate(bodies)]
     calls = "".join(
-        f"    c.{of} = {name}_{bodies.index(body)}(c.{of});\n"
-        for of, body in zip("rgb", channels, strict=True)
+        f"    c.{channel} = {name}_{bodies.index(body)}(c.{channel});\n"
+        for channel, body in zip("rgb", channels, strict=True)
     )
     return "\n".join([*texts, f"P4D_FN p4d_rgb {name}(p4d_rgb c) {{\n{calls}    return c;\n}}"])
 

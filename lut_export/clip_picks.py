@@ -93,34 +93,34 @@ def _row(
     row = np.zeros(left + 1 + HOLD * holds)
     row[PICKS : PICKS + 3] = picks, HEAD, left if holds else 0
     row[left] = holds
-    found, grids = _core.kernel_table(edit)
-    plans = int(found[PICKS + 1])
+    table, grids = _core.kernel_table(edit)
+    plans = int(table[PICKS + 1])
     active = {number: i for i, (number, _, _) in enumerate(now)}
     for place, number in enumerate(order):
         i = active.get(number)
         if place < picks:
-            at = HEAD + PICK * place
-            row[at : at + PICK] = 0
-            row[at + PLAN : at + PICK] = np.nan
-            row[at : at + 3] = np.nan
+            start = HEAD + PICK * place
+            row[start : start + PICK] = 0
+            row[start + PLAN : start + PICK] = np.nan
+            row[start : start + 3] = np.nan
             if i is not None:
                 plan = plans + PICK * i + PLAN
-                row[at + PLAN : at + PICK] = found[plan : plan + PICK - PLAN]
-                row[at : at + 3] = _node(now[i][1])
-            row[at + 3] = place
+                row[start + PLAN : start + PICK] = table[plan : plan + PICK - PLAN]
+                row[start : start + 3] = _node(now[i][1])
+            row[start + 3] = place
         else:
-            at = left + 1 + HOLD * (place - picks)
-            row[at : at + HOLD] = np.nan
+            start = left + 1 + HOLD * (place - picks)
+            row[start : start + HOLD] = np.nan
             if i is not None:
-                row[at : at + 3] = _node(now[i][1])
-                row[at + 4 : at + 7] = now[i][1]
-                row[at + 7] = now[i][2]
-            row[at + 3] = place
+                row[start : start + 3] = _node(now[i][1])
+                row[start + 4 : start + 7] = now[i][1]
+                row[start + 7] = now[i][2]
+            row[start + 3] = place
     curve = None
-    if found[DISPLAY] > 0:
-        count, first = int(found[DISPLAY]), int(found[DISPLAY + 1])
+    if table[DISPLAY] > 0:
+        count, first = int(table[DISPLAY]), int(table[DISPLAY + 1])
         samples = grids[first : first + count].tolist()
-        curve = (count, float(found[DISPLAY + 2]), float(found[DISPLAY + 3]), samples)
+        curve = (count, float(table[DISPLAY + 2]), float(table[DISPLAY + 3]), samples)
     return row, curve
 
 
@@ -138,8 +138,8 @@ def _fill(table: F64, picks: int, count: int) -> None:
     """Give what asks for nothing the numbers of its nearest frame, without strength and change."""
     for place in range(count):
         is_pick = place < picks
-        at = HEAD + PICK * place if is_pick else HEAD + PICK * picks + 1 + HOLD * (place - picks)
-        part = table[:, at : at + (PICK if is_pick else HOLD)]
+        start = HEAD + PICK * place if is_pick else HEAD + PICK * picks + 1 + HOLD * (place - picks)
+        part = table[:, start : start + (PICK if is_pick else HOLD)]
         on = np.flatnonzero(~np.isnan(part).any(axis=1))
         if len(on) == 0:
             part[np.isnan(part)] = 0
@@ -221,8 +221,8 @@ def _lines(
     for i in range(0, len(runs), 2):
         # The high bits of where codes are have room in the runs.
         lines += [
-            run | at >> 16 << 28
-            for run, at in zip(runs[i : i + 2], offsets[i : i + 2], strict=True)
+            run | offset >> 16 << 28
+            for run, offset in zip(runs[i : i + 2], offsets[i : i + 2], strict=True)
         ]
         lines.append(offsets[i] & 65535 | (offsets[i + 1] & 65535) << 16)
     return lines, bytes(shell)

@@ -139,7 +139,7 @@ def _picks(
     sidecar: _core.Sidecar, times: Sequence[float], room: int, output: object, *, textures: bool
 ) -> tuple[int, PickConstants | None]:
     """Return the picks with as many values in their mattes as have room, and how many."""
-    found = 0
+    size = 0
     for levels in LEVELS:
         edits = sidecar.edits.with_matte_levels(levels)
         try:
@@ -148,11 +148,11 @@ def _picks(
             raise Palette4dError(f"{output}: {error}") from error
         if picks is None:
             return 0, None
-        found = picks.table_size if textures else picks.size
-        if found <= room:
+        size = picks.table_size if textures else picks.size
+        if size <= room:
             return levels, picks
     raise Palette4dError(
-        f"{output}: found {found / 1024:.0f} KB of picks and holds, reduced as far as they can be, "
+        f"{output}: found {size / 1024:.0f} KB of picks and holds, reduced as far as they can be, "
         f"and there is room for {room / 1024:.0f} KB of {MOST_BYTES // 1024} KB: switch picks off, "
         f"or export a range of the clip ({Arg('frames')})"
     )
@@ -238,12 +238,12 @@ def bends(times: F64, states: Sequence[_State]) -> tuple[F64, float]:
     straight = values[0] + part[:, None, None] * (values[-1] - values[0])
     shape = (part * (1 - part))[:, None] * np.stack([np.ones_like(part), part], axis=1)
     rest = (values - straight)[:, :, 3:].reshape(len(times), -1)
-    found = np.zeros((2, rest.shape[1]))
+    slopes = np.zeros((2, rest.shape[1]))
     if len(times) > 2:
-        found = np.linalg.lstsq(shape, rest, rcond=None)[0]
-        found[np.abs(found) < TOLERANCE] = 0
-    bend = found.T.reshape(len(values[0]), 3, 2).transpose(0, 2, 1).reshape(-1, 6)
-    error = np.abs(rest - shape @ found).max(initial=np.abs((values - straight)[:, :, :3]).max())
+        slopes = np.linalg.lstsq(shape, rest, rcond=None)[0]
+        slopes[np.abs(slopes) < TOLERANCE] = 0
+    bend = slopes.T.reshape(len(values[0]), 3, 2).transpose(0, 2, 1).reshape(-1, 6)
+    error = np.abs(rest - shape @ slopes).max(initial=np.abs((values - straight)[:, :, :3]).max())
     return bend, float(error)
 
 
@@ -259,10 +259,10 @@ def keys_of(times: F64, states: Sequence[_State]) -> list[tuple[int, F64]]:
             one_body = all(s.body == states[start].body for s in states[end : trial + 1])
             fits = one_body and trial > end
             if fits:
-                found, error = bends(times[start : trial + 1], states[start : trial + 1])
+                bent, error = bends(times[start : trial + 1], states[start : trial + 1])
                 fits = error <= TOLERANCE
             if fits:
-                end, bend = trial, found
+                end, bend = trial, bent
             growing = growing and fits
             step = step * 2 if growing else step // 2
         keys.append((start, bend))

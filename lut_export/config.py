@@ -209,22 +209,22 @@ def _between(
     sidecars: list[Path], frames: list[tuple[int, ...]], strength: float, clip: str | None
 ) -> list[BetweenError | None]:
     """Return the errors between the frames of each sidecar; a command's child reads its clip."""
-    found = []
+    errors = []
     for file, baked in zip(sidecars, frames, strict=True):
         if sandbox.of_command():
             with Child(reads=files_of_sidecar(file, clip)) as child:
-                found.append(child.call(between_error, file, baked, strength, clip))
+                errors.append(child.call(between_error, file, baked, strength, clip))
         else:
-            found.append(between_error(file, baked, strength, clip))
-    return found
+            errors.append(between_error(file, baked, strength, clip))
+    return errors
 
 
 def _refuse_far(names: list[str], between: list[BetweenError | None]) -> None:
     far = [
-        f"shot {name!r}, frame {found.frame}: deltaE 2000 of {stated(found.delta_e)} from the look "
-        f"of frame {found.look}"
-        for name, found in zip(names, between, strict=True)
-        if found is not None and found.delta_e > LARGEST_DELTA_E
+        f"shot {name!r}, frame {error.frame}: deltaE 2000 of {stated(error.delta_e)} from the look "
+        f"of frame {error.look}"
+        for name, error in zip(names, between, strict=True)
+        if error is not None and error.delta_e > LARGEST_DELTA_E
     ]
     if far:
         raise Palette4dError(
@@ -317,9 +317,9 @@ def _add_views(config: Any) -> list[tuple[str, str]]:
             transform = config.getDisplayViewTransformName(display, view)
             space = config.getDisplayViewColorSpaceName(display, view)
             space = display if space == "<USE_DISPLAY_NAME>" else space
-            found = config.getColorSpace(space)
+            known = config.getColorSpace(space)
             looks = config.getDisplayViewLooks(display, view)
-            if (found is not None and found.isData()) or ANY_SHOT in looks:
+            if (known is not None and known.isData()) or ANY_SHOT in looks:
                 continue
             name = f"{view} + {ANY_SHOT}"
             with_ours = f"{ANY_SHOT}, {looks}" if looks else ANY_SHOT

@@ -97,9 +97,9 @@ def relocate(config: Any, base: str, archive: bool, folder: Path) -> list[str]:
         config.addSearchPath(LUTS)
         for path in own or [""]:
             absolute = Path(path).is_absolute() or path.startswith(("$", "%"))
-            found = path if absolute or not root else str(Path(root) / path)
-            if found != LUTS:
-                config.addSearchPath(found or ".")
+            moved = path if absolute or not root else str(Path(root) / path)
+            if moved != LUTS:
+                config.addSearchPath(moved or ".")
         if root and not archive:
             notes.append(f"the base's own files are still read from {root}")
         # If a config lists variables, OpenColorIO ignores all other environment variables.

@@ -46,8 +46,8 @@ class BetweenError:
 
 def nearest(baked: tuple[int, ...], frame: int) -> int:
     """Return the baked frame whose look a frame shows: the nearest, the earlier of two."""
-    at = bisect.bisect_left(baked, frame)
-    return min(baked[max(at - 1, 0) : at + 1], key=lambda other: (abs(other - frame), other))
+    place = bisect.bisect_left(baked, frame)
+    return min(baked[max(place - 1, 0) : place + 1], key=lambda other: (abs(other - frame), other))
 
 
 def between_error(
@@ -82,13 +82,13 @@ def between_error(
         look = nearest(baked, frame)
         edits = [frame_edit(sidecar, time, strength) for time in (frame, look)]
         if all(edit.identity for edit in edits):
-            found = BetweenError(0.0, frame, look, on_clip=False)
+            error = BetweenError(0.0, frame, look, on_clip=False)
         else:
             colours, on_clip = _colours(path, sidecar, frame, clip)
             here, there = (viewing.lab(edit.exact(colours)) for edit in edits)
             largest = float(delta_e_2000(here, there).max(initial=0.0))
-            found = BetweenError(largest, frame, look, on_clip)
-        worst = found if worst is None or found.delta_e > worst.delta_e else worst
+            error = BetweenError(largest, frame, look, on_clip)
+        worst = error if worst is None or error.delta_e > worst.delta_e else worst
     return worst
 
 

@@ -77,11 +77,11 @@ class FrameEdit:
         if self.identity:
             return points
         at = points if self.conversion is None else self.conversion.to_palette(points)
-        found = self.recolourer.displaced(at, strength=self.strength)
+        displaced = self.recolourer.displaced(at, strength=self.strength)
         if self.conversion is None:
-            return found
-        moved = (found != at).any(axis=1, keepdims=True)
-        return np.where(moved, self.conversion.to_clip(found), points)
+            return displaced
+        moved = (displaced != at).any(axis=1, keepdims=True)
+        return np.where(moved, self.conversion.to_clip(displaced), points)
 
 
 def frame_edit(

@@ -195,9 +195,9 @@ def describe(
     ]
     if errors is not None:
         places = ("dense grid", f"clip's colours at frame {job.image_frame}")
-        for where, found in zip(places, errors, strict=True):
-            if found is not None:
-                lines.append(f"error on the {where}: {figures_text(found.worst)}")
+        for where, error in zip(places, errors, strict=True):
+            if error is not None:
+                lines.append(f"error on the {where}: {figures_text(error.worst)}")
         lines.append(f"errors hold for the readings {' and '.join(job.format.readings)}")
         lines.append(f"deltaE: {job.viewing.assumption}")
     made_from = f"{job.sha256} {job.frame!r} {job.settings.strength!r} {job.shaper!r}"

@@ -172,9 +172,9 @@ def _ramp_times(sidecar: _core.Sidecar, edge: str) -> list[float]:
         parts = np.linspace(0, 1, 5)
         # Just inside: at its ends the edge has no place of its own in a slice.
         inner = start + (end - start) * np.clip(parts, 1e-6, 1 - 1e-6)
-        found = np.array([moved(time) for time in inner.tolist()])
-        line = found[0] + parts[:, None] * (found[-1] - found[0])
-        if np.abs(found - line).max() <= STRAIGHT:
+        colours = np.array([moved(time) for time in inner.tolist()])
+        line = colours[0] + parts[:, None] * (colours[-1] - colours[0])
+        if np.abs(colours - line).max() <= STRAIGHT:
             return []
         middle = (start + end) / 2
         return [*bends(start, middle), middle, *bends(middle, end)]
@@ -247,40 +247,40 @@ def export(
         Ctrl-C; all written files are complete, and the indexes list them.
     """
     exports = [_Export(request) for request in requests]
-    for one in exports:
-        make_folder(one.request.folder)
-    total = sum(len(one.request.frames) for one in exports)
+    for running in exports:
+        make_folder(running.request.folder)
+    total = sum(len(running.request.frames) for running in exports)
 
     def tell() -> None:
         if progress is not None:
-            progress(sum(one.done for one in exports), total)
+            progress(sum(running.done for running in exports), total)
 
     def take(key: tuple[int, int], outcome: tuple[Entry, bytes] | Failed) -> None:
         exports[key[0]].take(key[1], outcome)
         tell()
 
     tell()
-    tasks = {(i, f): task for i, one in enumerate(exports) for f, task in one.tasks.items()}
+    tasks = {(i, f): task for i, running in enumerate(exports) for f, task in running.tasks.items()}
     try:
         try:
             (workers or Workers()).run(bake_frame, tasks, take, reads=_files(requests))
         finally:
-            for one in exports:
-                one.finish()
+            for running in exports:
+                running.finish()
     except WriteError as error:
         raise WriteError(
             f"{error}; the files that are there are whole, and the same command goes on from them"
         ) from error
-    return [one.series() for one in exports]
+    return [running.series() for running in exports]
 
 
 def _files(requests: Sequence[Request]) -> list[Path]:
     """Return what the processes that bake must read."""
-    found: list[Path] = []
-    for one in requests:
-        found += files_of_sidecar(one.sidecar, one.clip)
-        found += files_of_config(one.settings.ocio_config or os.environ.get("OCIO") or "")
-    return list(dict.fromkeys(found))
+    files: list[Path] = []
+    for request in requests:
+        files += files_of_sidecar(request.sidecar, request.clip)
+        files += files_of_config(request.settings.ocio_config or os.environ.get("OCIO") or "")
+    return list(dict.fromkeys(files))
 
 
 class _Export:

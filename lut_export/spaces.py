@@ -143,9 +143,11 @@ def _half_lut(step: Step, back: bool) -> Any:
     import PyOpenColorIO as ocio
 
     chain = _core.ColourConversion(json.dumps([step]))
-    at = np.arange(65536, dtype=np.uint16).view(np.float16).astype(np.float64)
+    halves = np.arange(65536, dtype=np.uint16).view(np.float16).astype(np.float64)
     largest = float(np.finfo(np.float16).max)
-    ramp = np.repeat(np.nan_to_num(at, nan=0, posinf=largest, neginf=-largest)[:, None], 3, axis=1)
+    ramp = np.repeat(
+        np.nan_to_num(halves, nan=0, posinf=largest, neginf=-largest)[:, None], 3, axis=1
+    )
     values = chain.to_clip(ramp) if back else chain.to_palette(ramp)
     lut = ocio.Lut1DTransform(length=65536, inputHalfDomain=True)
     lut.setFileOutputBitDepth(ocio.BIT_DEPTH_F32)

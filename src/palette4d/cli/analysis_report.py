@@ -53,8 +53,8 @@ def _palette(x: Mapping[str, Any]) -> dict[str, str]:
     handles = f"{x['colours_a_frame']:.1f} colours a frame, {counted(x['splits'], 'split')}, "
     handles += counted(x["merges"], "merge")
     if "closest_handles" in x:
-        one, other = x["closest_handle_ids"].split()
-        handles += f"; nearest {one} and {other}, {x['closest_handles']:.2f} apart at frame "
+        first, second = x["closest_handle_ids"].split()
+        handles += f"; nearest {first} and {second}, {x['closest_handles']:.2f} apart at frame "
         handles += f"{x['closest_handles_frame']}"
     concave = f"deepest concavity {concavity:.1%} of the convex hull, at frame "
     return {

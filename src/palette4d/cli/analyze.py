@@ -85,9 +85,9 @@ def _settings_help() -> list[str]:
     for name, option in OPTIONS.items():
         if name == "vertices":  # it has its own option
             continue
-        of = "" if set(METHODS) <= set(option.methods) else f"; {', '.join(option.methods)}"
+        only = "" if set(METHODS) <= set(option.methods) else f"; {', '.join(option.methods)}"
         lines.append(f"  {name:<19} {option.text}")
-        limits = f"{option.low:.10g} to {option.high:.10g}, default {option.default:g}{of}"
+        limits = f"{option.low:.10g} to {option.high:.10g}, default {option.default:g}{only}"
         lines.append(f"  {'':<19} ({limits})")
     return lines
 

@@ -140,11 +140,11 @@ def report(result: BakeResult) -> Iterator[str]:
         yield f"  takes and returns {result.encoding}; {result.conversion}"
     rows = []
     measures = ((f"clip's colours at frame {result.clip_frame}", result.clip),)
-    for where, found in (*measures, ("dense grid", result.grid)):
-        if found is not None and len(found.by_reading) == 1:
-            rows.append((where, found.worst))
-        elif found is not None:
-            rows += [(f"{where}, {name}", each) for name, each in found.by_reading.items()]
+    for where, error in (*measures, ("dense grid", result.grid)):
+        if error is not None and len(error.by_reading) == 1:
+            rows.append((where, error.worst))
+        elif error is not None:
+            rows += [(f"{where}, {name}", each) for name, each in error.by_reading.items()]
     yield from (f"  {line}" for line in table(rows))
     yield f"  deltaE: {result.viewing}; code values in the file: {result.rounding}"
 
@@ -178,11 +178,11 @@ def warnings(result: BakeResult, format_: LutFormat) -> Iterator[str]:
             ".cube) does"
         )
     if result.clean_up is not None and result.cdl is None and result.clean_up.most > VISIBLE:
-        found = result.clean_up
+        cleaned = result.clean_up
         yield (
             "no LUT has Clean up: from the picture of the node and `palette4d render` the file is "
-            f"off by a deltaE 2000 of {stated(found.mean)} on average, 99 % of the pixels by at "
-            f"most {stated(found.most)}"
+            f"off by a deltaE 2000 of {stated(cleaned.mean)} on average, 99 % of the pixels by at "
+            f"most {stated(cleaned.most)}"
         )
     if clip and result.visible:
         yield (

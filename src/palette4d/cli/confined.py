@@ -74,8 +74,8 @@ def _needs(args: argparse.Namespace) -> Needs | None:
         return _of_analysis(args)
     if args.verb in ("render", "plot", "bake"):
         output = Path(args.output)
-        found = sandbox.parts(output.parent, {output.suffix.lower().lstrip(".")})
-        return Needs(Promise.of_file(output), [Path(args.sidecar)], args.clip, list(found))
+        parts = sandbox.parts(output.parent, {output.suffix.lower().lstrip(".")})
+        return Needs(Promise.of_file(output), [Path(args.sidecar)], args.clip, list(parts))
     if args.verb == "edit" and args.action in READING:
         return _of_edit(args)
     return None

@@ -316,20 +316,22 @@ def run_set(args: argparse.Namespace) -> int:
         raise Palette4dError("found --near without --frame, expected the frame where it is seen")
     document = load(args.sidecar)
     before = _without_picks(document)
-    found = document.set_near(args.near, frame=args.frame, anyway=args.anyway, **_how(args))
+    nearest = document.set_near(args.near, frame=args.frame, anyway=args.anyway, **_how(args))
     document.save()
     print(
         f"the palette colour nearest to {shown(args.near)} at frame {args.frame:g} is "
-        f"{shown(found.rgb)} of {found.id}, {found.distance:.3f} away"
+        f"{shown(nearest.rgb)} of {nearest.id}, {nearest.distance:.3f} away"
     )
-    if found.handle is None:
+    if nearest.handle is None:
         _report(document.grade, before)
     else:
         after = document.grade.near(
-            found.rgb if args.rgb is None else args.rgb, frame=args.frame
+            nearest.rgb if args.rgb is None else args.rgb, frame=args.frame
         ).rgb
-        at = f" at frame {args.frame:g}"
-        print(f"{document.grade.named(found.handle)}: {shown(found.rgb)} -> {shown(after)}{at}")
+        when = f" at frame {args.frame:g}"
+        print(
+            f"{document.grade.named(nearest.handle)}: {shown(nearest.rgb)} -> {shown(after)}{when}"
+        )
     return 0
 
 

@@ -137,8 +137,8 @@ def run(args: argparse.Namespace) -> int:
         for written in (args.ccc, args.edl):
             if written is not None:
                 print(f"{written}: a CDL for each of {counted(len(done.series), 'shot')}")
-        for one in done.series:
-            print("\n".join(report(one)))
+        for series_of_shot in done.series:
+            print("\n".join(report(series_of_shot)))
     warn(args, done.series)
     if failed:
         raise failed
@@ -188,7 +188,7 @@ def _index(done: Exported, source: Path) -> dict[str, Any]:
     from palette4d.shows.manifest import is_manifest
 
     if is_manifest(source):
-        return {one.document["clip"]["name"]: one.document for one in done.series}
+        return {shot.document["clip"]["name"]: shot.document for shot in done.series}
     return done.series[0].document
 
 
@@ -224,11 +224,11 @@ def warn(args: argparse.Namespace, done: list[Series]) -> None:
     from palette4d.lut_export.bake_error import stated
     from palette4d.lut_export.formats import shaper_warning
 
-    entries = [entry for one in done for entry in one.document["frames"]]
+    entries = [entry for shot in done for entry in shot.document["frames"]]
     shaped = {
-        one.document["options"]["format"]
-        for one in done
-        for entry in one.document["frames"]
+        shot.document["options"]["format"]
+        for shot in done
+        for entry in shot.document["frames"]
         if entry["shaper"]["kind"] != "none"
     }
     for name in shaped:

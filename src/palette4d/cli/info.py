@@ -87,9 +87,9 @@ def info_of(document: "Document") -> dict[str, Any]:
     def palette_of(frame: float) -> tuple["Palette", dict[str, list[int]]]:
         """Return a palette, and where in it ids and ends of edges are."""
         palette, places = document.grade.palette(frame), dict[str, list[int]]()
-        for at, (id_, ends) in enumerate(zip(palette.ids, palette.ends, strict=True)):
+        for place, (id_, ends) in enumerate(zip(palette.ids, palette.ends, strict=True)):
             for each in {id_, *ends}:
-                places.setdefault(each, []).append(at)
+                places.setdefault(each, []).append(place)
         return palette, places
 
     return {
@@ -146,16 +146,16 @@ def _track(
     edited = [id_ for id_ in track.vertices if id_ in document.grade.settings]
     edited += [id_ for edge in track.edges for id_ in on_edge[edge]]
     inside = {*track.vertices, *track.edges}
-    found = []
+    changes = []
     frames = [track.frame, track.first]
     for frame in [*frames, *(document.grade.frame_of(id_) for id_ in edited)]:
         palette, places = palette_of(float(frame))
         few = inside if len(inside) < len(places) else [id_ for id_ in places if id_ in inside]
-        for at in sorted({at for id_ in few for at in places.get(id_, ())}):
-            rgb, after = palette.rgb[at], palette.edited[at]
-            change = float(abs(after - rgb).max()) + (palette.ids[at] in inside) * 1e-9
-            found.append((change, palette.frame, rgb.tolist(), after.tolist()))
-    _, frame, rgb, after = max(found, key=lambda each: each[0])
+        for place in sorted({place for id_ in few for place in places.get(id_, ())}):
+            rgb, after = palette.rgb[place], palette.edited[place]
+            change = float(abs(after - rgb).max()) + (palette.ids[place] in inside) * 1e-9
+            changes.append((change, palette.frame, rgb.tolist(), after.tolist()))
+    _, frame, rgb, after = max(changes, key=lambda each: each[0])
     return {
         "name": track.name,
         "called": track.called,

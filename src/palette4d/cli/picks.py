@@ -269,20 +269,20 @@ def run_pick(args: argparse.Namespace) -> int:
                     "--with corrects the path of an earlier pick; it goes with --frame, --colour, "
                     f"--pixel, --box and --clip only. `change {args.same}` changes the rest"
                 )
-            found = document.correct_path(args.same, args.frame, **where, progress=progress)
+            pick = document.correct_path(args.same, args.frame, **where, progress=progress)
         elif args.action == "hold":
-            found = document.hold(args.frame, **where, **given, progress=progress)
+            pick = document.hold(args.frame, **where, **given, progress=progress)
         else:
             if args.to is None and args.by is None:
                 raise Palette4dError(
                     "found neither --to nor --by, expected the new colour or the change "
                     "(or --with ID)"
                 )
-            found = document.pick(
+            pick = document.pick(
                 args.frame, **where, to=args.to, by=args.by, **given, progress=progress
             )
     document.save()
-    _print_pick(args, document, found.id, followed=args.follow is not False)
+    _print_pick(args, document, pick.id, followed=args.follow is not False)
     return 0
 
 
@@ -303,11 +303,11 @@ def run_change(args: argparse.Namespace) -> int:
             changes["by"] = args.by
         if not changes:
             raise Palette4dError("found nothing to change, expected at least one option")
-        found = document.change_pick(
+        pick = document.change_pick(
             args.id, any_value=args.any_value, clip=args.clip, progress=progress, **changes
         )
     document.save()
-    _print_pick(args, document, found.id, followed=args.follow is not False)
+    _print_pick(args, document, pick.id, followed=args.follow is not False)
     return 0
 
 
@@ -417,9 +417,12 @@ def _path(pick: Pick) -> list[str]:
         return []
     first, far, last = float(frames[0]), float(frames[away.argmax()]), float(frames[-1])
     told = sorted({first, far, last, pick.frame})
-    hexes = [(hex_of(rgb), swatch(rgb)) for rgb in (pick.colour_at(at).tolist() for at in told)]
+    hexes = [
+        (hex_of(rgb), swatch(rgb)) for rgb in (pick.colour_at(frame).tolist() for frame in told)
+    ]
     colours = [
-        f"{patch}{text} at frame {at:g}" for at, (text, patch) in zip(told, hexes, strict=True)
+        f"{patch}{text} at frame {frame:g}"
+        for frame, (text, patch) in zip(told, hexes, strict=True)
     ]
     changes = len({text for text, _ in hexes}) > 1
     lines = [f"  follows its colour{': ' + ', '.join(colours) if changes else ', which stays'}"]

@@ -83,10 +83,10 @@ def _opened(
 
     path = Path(oiio_text.file_name(spec))
     if path.is_dir():
-        found = clip_sequence.in_folder(path)
-        if isinstance(found, clip_sequence.ImageSequence):
-            return images(found, None, False)
-        path = found
+        clip = clip_sequence.in_folder(path)
+        if isinstance(clip, clip_sequence.ImageSequence):
+            return images(clip, None, False)
+        path = clip
     extension = clip_sequence.extension(path)
     if path.is_file():
         if extension in clip_sequence.IMAGE_EXTENSIONS:

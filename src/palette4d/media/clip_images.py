@@ -126,13 +126,13 @@ class ImageClip(Clip):
 
     def _check(self, header: Header, frame: int) -> None:
         """Raise an error if a frame's size or channels differ from the first frame's."""
-        for found, expected in (
+        for own, expected in (
             (_size_of(header), _size_of(self)),
             (_alpha_of(header), _alpha_of(self)),
         ):
-            if found != expected:
+            if own != expected:
                 raise FrameError(
-                    f"{self.sequence.path(frame)}: frame {frame} has {found}, expected {expected} "
+                    f"{self.sequence.path(frame)}: frame {frame} has {own}, expected {expected} "
                     "as in the frames before.",
                     LEAVE_OUT,
                 )
@@ -195,12 +195,12 @@ def open_images(
 
 def _stated(header: Header) -> Stated:
     """Return the first frame's metadata, for a movie that is made of the sequence."""
-    found = {name: value for name, _, value in header.metadata}
-    aspect = float(found.get("PixelAspectRatio", 1.0))
+    values = {name: value for name, _, value in header.metadata}
+    aspect = float(values.get("PixelAspectRatio", 1.0))
     return Stated(
         tags=header.tags,
         pixel_aspect=Fraction(aspect).limit_denominator(1000) if aspect > 0 else Fraction(1),
-        reel=str(found.get("reelName", "")),
+        reel=str(values.get("reelName", "")),
     )
 
 
@@ -208,7 +208,7 @@ def _wanted_frames(
     sequence: ImageSequence, frames: str | None, embedded: str | None, *, gaps: bool
 ) -> list[int]:
     """Return the frames asked for; with `gaps` they may all lie between the files."""
-    found = sequence.numbers
+    numbers = sequence.numbers
     if embedded is not None:
         whole = parse_frames(embedded)
         if frames is None:
@@ -223,36 +223,36 @@ def _wanted_frames(
     elif frames is not None:
         wanted = parse_frames(frames)
     else:
-        step = progression_step(found)
-        count = (found[-1] - found[0]) // step + 1
+        step = progression_step(numbers)
+        count = (numbers[-1] - numbers[0]) // step + 1
         if count > MAX_FRAMES:
             raise ClipError(
-                f"{sequence.pattern}: the {len(found)} files are numbered from {found[0]} to "
-                f"{found[-1]}, which looks like dates or ids; expected frame numbers. "
+                f"{sequence.pattern}: the {len(numbers)} files are numbered from {numbers[0]} to "
+                f"{numbers[-1]}, which looks like dates or ids; expected frame numbers. "
                 f"Number the files, or choose a range with {Arg('frames')}."
             )
-        return list(range(found[0], found[-1] + 1, step))
-    inside = any(found[0] < frame < found[-1] for frame in wanted)
-    if not set(wanted) & set(found) and not (gaps and inside):
+        return list(range(numbers[0], numbers[-1] + 1, step))
+    inside = any(numbers[0] < frame < numbers[-1] for frame in wanted)
+    if not set(wanted) & set(numbers) and not (gaps and inside):
         raise ClipError(
             f"{sequence.pattern}: found no {named(wanted)}, the clip has "
-            f"{describe(found)}. Choose a range inside the clip."
+            f"{describe(numbers)}. Choose a range inside the clip."
         )
     return wanted
 
 
 def _missing(sequence: ImageSequence, missing: list[int]) -> FrameError:
-    found = sequence.numbers
-    if outside := [frame for frame in missing if not found[0] <= frame <= found[-1]]:
+    numbers = sequence.numbers
+    if outside := [frame for frame in missing if not numbers[0] <= frame <= numbers[-1]]:
         return FrameError(
-            f"{sequence.pattern}: the clip has {named(found)}; {named(outside)} "
+            f"{sequence.pattern}: the clip has {named(numbers)}; {named(outside)} "
             f"{'is' if len(outside) == 1 else 'are'} outside. Choose a range inside the clip with "
             f"{Arg('frames')}, or leave such frames out with {Arg('skip_bad_frames', True)}."
         )
-    gap = any(found[0] < frame < found[-1] for frame in missing)
+    gap = any(numbers[0] < frame < numbers[-1] for frame in missing)
     no_file = f" (no file {sequence.path(missing[0]).name})" if gap else ""
     return FrameError(
-        f"{sequence.pattern}: {named(missing)} missing{no_file}, the clip has {describe(found)}.",
+        f"{sequence.pattern}: {named(missing)} missing{no_file}, the clip has {describe(numbers)}.",
         LEAVE_OUT,
     )
 

@@ -157,8 +157,8 @@ class MovieClip(Clip):
 
     def _passes_key(self, frame: int) -> bool:
         """Whether seeking to a key frame before a frame saves decoding of the pictures between."""
-        at = bisect.bisect_right(self.key_frames, frame) - 1
-        return at >= 0 and self.key_frames[at] >= self._next + WORTH_SEEKING
+        index = bisect.bisect_right(self.key_frames, frame) - 1
+        return index >= 0 and self.key_frames[index] >= self._next + WORTH_SEEKING
 
     def _start(self, frame: int) -> None:
         self._decoder = self._decode(frame)

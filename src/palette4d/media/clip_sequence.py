@@ -75,8 +75,8 @@ class ImageSequence:
 
     def path(self, frame: int) -> Path:
         """The file of a frame, whether it exists or not."""
-        found = self.files.get(frame)
-        return found or self.folder / f"{self.prefix}{frame:0{self.width}d}{self.suffix}"
+        file = self.files.get(frame)
+        return file or self.folder / f"{self.prefix}{frame:0{self.width}d}{self.suffix}"
 
     def __str__(self) -> str:
         """Pattern and frames, for a message."""
@@ -158,18 +158,18 @@ def _by_width(
 
 def in_folder(folder: Path) -> ImageSequence | Path:
     """The only image sequence of a folder, or its only image if that has no number."""
-    found = sequences_in(folder)
+    sequences = sequences_in(folder)
     names = _file_names(folder)
     images = [name for name in names if extension(name) in IMAGE_EXTENSIONS]
     movies = [name for name in names if extension(name) in MOVIE_EXTENSIONS]
     # One numbered image among other images (beach.png, sky2.png) is not a sequence.
-    if len(found) == 1 and (len(found[0].files) > 1 or len(images) == 1):
-        return found[0]
-    if not found and len(images) == 1:
+    if len(sequences) == 1 and (len(sequences[0].files) > 1 or len(images) == 1):
+        return sequences[0]
+    if not sequences and len(images) == 1:
         return folder / images[0]
-    if len(found) > 1:
-        what = f"{len(found)} image sequences"
-        listed = [f"{one.pattern}  {describe(one.numbers)}" for one in found]
+    if len(sequences) > 1:
+        what = f"{len(sequences)} image sequences"
+        listed = [f"{sequence.pattern}  {describe(sequence.numbers)}" for sequence in sequences]
     elif images:
         what = f"{len(images)} images that are no sequence"
         listed = [str(folder / name) for name in images]
@@ -227,8 +227,8 @@ def of_pattern(spec: str) -> tuple[ImageSequence, str | None]:
 
     # A single `#` means any number in some programs, four digits in others: the files decide.
     if str(parsed.padding()) == "#" and matches:
-        found = list(_by_width(folder, prefix, suffix, matches))
-        sequence = max(found, key=lambda one: len(one.files))
+        sequences = list(_by_width(folder, prefix, suffix, matches))
+        sequence = max(sequences, key=lambda each: len(each.files))
     else:
         files = {int(n): folder / name for n, name in matches if _digits_fit(n, width)}
         sequence = ImageSequence(folder, prefix, suffix, width, files)
@@ -239,7 +239,7 @@ def of_pattern(spec: str) -> tuple[ImageSequence, str | None]:
 
 def _near(spec: str, folder: Path) -> str:
     """The folder's sequences for the error message, the most similar first."""
-    patterns = {Path(one.pattern).name: str(one) for one in sequences_in(folder)}
+    patterns = {Path(sequence.pattern).name: str(sequence) for sequence in sequences_in(folder)}
     if not patterns:
         return f"{folder} holds no image sequence"
     wanted = Path(spec).name

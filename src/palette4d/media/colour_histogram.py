@@ -35,12 +35,12 @@ def histogram(rgb: F64, counts: F64) -> F64:
     return shares_of_cells
 
 
-def mean_shift(one: F64, other: F64) -> float:
+def mean_shift(before: F64, after: F64) -> float:
     """Return how far the pixels' code values differ in the channel that differs most.
 
     It is the earth mover's distance of the channels' histograms, from the cells' code values.
     """
-    excess = (one - other).reshape(CELLS, CELLS, CELLS)
+    excess = (before - after).reshape(CELLS, CELLS, CELLS)
     shifts = [
         np.abs(np.cumsum(excess.sum(axis=others))[:-1]) @ np.diff(_CODE_VALUES)
         for others in ((1, 2), (0, 2), (0, 1))

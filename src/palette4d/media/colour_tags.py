@@ -163,8 +163,8 @@ def encoding_of(tags: ColourTags) -> str:
 def interop_name(tags: ColourTags) -> str:
     """Return the interop forum's name of tags, which EXR holds; "" if it has none."""
     camera = 1 if tags.transfer in _CAMERA and tags.primaries == 1 else tags.transfer
-    found = (row[1] for row in _ENCODINGS if row[1] and row[2:4] == (tags.primaries, camera))
-    return next(found, "")
+    names = (row[1] for row in _ENCODINGS if row[1] and row[2:4] == (tags.primaries, camera))
+    return next(names, "")
 
 
 def chromaticities(primaries: int) -> tuple[float, ...] | None:

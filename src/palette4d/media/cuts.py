@@ -74,16 +74,16 @@ def _gaps(
     return numbers, gaps, moved
 
 
-def _is_cut(gaps: dict[int, list[float]], at: int) -> bool:
-    """Return whether a shot begins with frame `at`, an index from 1."""
+def _is_cut(gaps: dict[int, list[float]], first: int) -> bool:
+    """Return whether a shot begins with frame `first`, an index from 1."""
     jumps = gaps[1]
-    jump = jumps[at - 1]
-    around = _activity(jumps, at - 1, at)
+    jump = jumps[first - 1]
+    around = _activity(jumps, first - 1, first)
     if jump < LEAST_DIFFERENCE or jump < LEAST_RATIO * around:
         return False
     for length in range(1, LONGEST_FLASH + 1):
         # The flash lies between `start` and `start + length + 1`; the jump is one of its edges.
-        for start in range(at - 1 - length, at):
+        for start in range(first - 1 - length, first):
             if 0 <= start < len(gaps[length + 1]) and (gaps[length + 1][start] <= AGREEMENT * jump):
                 return False
     return True
@@ -108,9 +108,9 @@ def _usual(jumps: list[float]) -> float:
     return ordered[-2] if len(ordered) > 2 else ordered[-1]
 
 
-def difference(one: F64, other: F64) -> float:
+def difference(before: F64, after: F64) -> float:
     """Return the share of pixels, 0 to 1, without a counterpart in the other histogram."""
-    return float(1 - np.minimum(one, other).sum())
+    return float(1 - np.minimum(before, after).sum())
 
 
 def refusal(frames: Sequence[int], cuts: Sequence[int]) -> Message:

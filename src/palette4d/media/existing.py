@@ -56,5 +56,5 @@ def is_whole_movie(path: Path, frames: Sequence[int]) -> bool:
 def again(damaged: int, older: int) -> list[str]:
     """Return a note on the files of an earlier render that are rendered again."""
     counts = [(damaged, "damaged"), (older, "older than the sidecar")]
-    found = [f"{count} {word}" for count, word in counts if count]
-    return [f"files rendered again: {', '.join(found)}"] if found else []
+    counted = [f"{count} {word}" for count, word in counts if count]
+    return [f"files rendered again: {', '.join(counted)}"] if counted else []

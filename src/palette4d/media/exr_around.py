@@ -34,18 +34,18 @@ class Around:
 
 def described(spec: Any, chosen: list[int], parts: int) -> str:
     """Return the other contents of an EXR in words: channels, parts, overscan; "" for none."""
-    found = []
+    extras = []
     left, top = spec.full_x - spec.x, spec.full_y - spec.y
     right = spec.x + spec.width - spec.full_x - spec.full_width
     if max(left, top, right, spec.y + spec.height - spec.full_y - spec.full_height) > 0:
-        found.append("overscan")
+        extras.append("overscan")
     further = [name for i, name in enumerate(spec.channelnames) if i not in chosen]
     if further:
         shown = ", ".join(further[:4]) + (", …" if further[4:] else "")
-        found.append(f"{len(further)} further channel{'s' * (len(further) > 1)} ({shown})")
+        extras.append(f"{len(further)} further channel{'s' * (len(further) > 1)} ({shown})")
     if parts > 1:
-        found.append(f"{parts - 1} further part{'s' * (parts > 2)}")
-    return ", ".join(found)
+        extras.append(f"{parts - 1} further part{'s' * (parts > 2)}")
+    return ", ".join(extras)
 
 
 def has_every_block(path: Path) -> bool:
@@ -54,29 +54,29 @@ def has_every_block(path: Path) -> bool:
     OpenEXR writes a full disk's file without an error then, and reads it; others do not.
     """
     with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as exr:
-        several, at = bool(exr[5] & 0x10), 8
+        several, offset = bool(exr[5] & 0x10), 8
         counts = []
-        while exr[at]:
-            at, attributes = _attributes(exr, at)
+        while exr[offset]:
+            offset, attributes = _attributes(exr, offset)
             counts.append(_blocks(attributes))
             if not several:
                 break
-        at += several  # an empty header ends the list
-        table = np.frombuffer(exr[at : at + 8 * sum(counts)], "<u8")
+        offset += several  # an empty header ends the list
+        table = np.frombuffer(exr[offset : offset + 8 * sum(counts)], "<u8")
         return len(table) == sum(counts) and bool(table.all())
 
 
-def _attributes(exr: Any, at: int) -> tuple[int, dict[bytes, bytes]]:
+def _attributes(exr: Any, offset: int) -> tuple[int, dict[bytes, bytes]]:
     """Return the place behind a header, and its attributes: name, type, size, value."""
-    found = {}
-    while exr[at]:
-        kind = exr.find(b"\0", at) + 1
+    attributes = {}
+    while exr[offset]:
+        kind = exr.find(b"\0", offset) + 1
         size = exr.find(b"\0", kind) + 1
         value = size + 4
         end = value + int.from_bytes(exr[size:value], "little")
-        found[exr[at : kind - 1]] = exr[value:end]
-        at = end
-    return at + 1, found
+        attributes[exr[offset : kind - 1]] = exr[value:end]
+        offset = end
+    return offset + 1, attributes
 
 
 def _blocks(attributes: dict[bytes, bytes]) -> int:

@@ -74,10 +74,10 @@ def _set_timecode(header: dict[str, Any], timecode: str) -> None:
     """Set the timecode of a part that has one; "" removes it."""
     if not timecode:
         header.pop("timeCode", None)
-    elif found := header.get("timeCode"):
+    elif own := header.get("timeCode"):
         numbers = [int(part) for part in re.split("[:;.]", timecode)]
-        found.hours, found.minutes, found.seconds, found.frame = numbers
-        found.dropFrame = timecode[8] != ":"
+        own.hours, own.minutes, own.seconds, own.frame = numbers
+        own.dropFrame = timecode[8] != ":"
 
 
 def _lossless_rows(header: dict[str, Any]) -> None:

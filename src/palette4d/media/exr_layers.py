@@ -30,18 +30,20 @@ def pictures(spec: Any) -> list[tuple[str, str, list[int]]]:
     names = [oiio_text.readable(name) for name in spec.channelnames]
     views = [str(view) for view in spec.getattribute("multiView") or ()]
     own = oiio_text.readable(spec.get_string_attribute("view")) or (views[0] if views else "")
-    found = []
+    layers = []
     for prefix in dict.fromkeys(name.rpartition(".")[0] for name in names):
         dot = f"{prefix}." if prefix else ""
         for colours in COLOURS:
-            channels = [names.index(dot + one) for one in colours if dot + one in names]
+            channels = [names.index(dot + channel) for channel in colours if dot + channel in names]
             if len(channels) == 3:
-                alpha = [names.index(dot + one) for one in _ALPHAS if dot + one in names]
+                alpha = [
+                    names.index(dot + channel) for channel in _ALPHAS if dot + channel in names
+                ]
                 words = prefix.split(".") if prefix else []
                 view = next((word for word in words if word in views), own)
                 layer = ".".join(word for word in words if word not in views)
-                found.append((layer, view, channels + alpha[:1]))
-    return found
+                layers.append((layer, view, channels + alpha[:1]))
+    return layers
 
 
 def part_name(spec: Any) -> str:
@@ -51,9 +53,9 @@ def part_name(spec: Any) -> str:
 
 def described(specs: list[Any]) -> str:
     """Return the layers and views of a file for an error."""
-    found: list[str] = []
+    names: list[str] = []
     for spec in specs:
         for layer, view, _ in pictures(spec):
             name = layer or part_name(spec) or "the main layer"
-            found.append(f"{name} (view {view})" if view else name)
-    return ", ".join(dict.fromkeys(found)) or "no layers"
+            names.append(f"{name} (view {view})" if view else name)
+    return ", ".join(dict.fromkeys(names)) or "no layers"

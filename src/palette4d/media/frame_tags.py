@@ -20,24 +20,24 @@ def of_movie(clip: Clip, frame: int) -> Metadata:
 
     stated = clip.stated
     rate = (clip.rate.numerator, clip.rate.denominator)
-    found: list[tuple[str, Any, Any]] = [
+    metadata: list[tuple[str, Any, Any]] = [
         ("FramesPerSecond", oiio.TypeDesc("rational"), rate),
         ("dpx:FrameRate", "float", float(clip.rate)),
         ("PixelAspectRatio", "float", float(stated.pixel_aspect)),
         *of_colours(clip),
     ]
     if stated.reel:
-        found.append(("reelName", "string", stated.reel))
+        metadata.append(("reelName", "string", stated.reel))
     if stated.timecode and _counts(clip.rate):
         word = encoded(moved(stated.timecode, frame, clip.rate))
         if word is not None:
-            found.append((TIMECODE, oiio.TypeTimeCode, (word, 0)))
-    return tuple(found)
+            metadata.append((TIMECODE, oiio.TypeTimeCode, (word, 0)))
+    return tuple(metadata)
 
 
 def of_another_frame(metadata: Metadata, later: int, rate: Fraction) -> Metadata:
     """Return the metadata for another frame, `frames` later, with its own timecode."""
-    kept = tuple(one for one in metadata if one[0] not in _OF_ONE_FRAME)
+    kept = tuple(entry for entry in metadata if entry[0] not in _OF_ONE_FRAME)
     for name, kind, value in metadata:
         if name == TIMECODE and _counts(rate):
             word = encoded(moved(decoded(int(value[0])), later, rate))
@@ -54,14 +54,14 @@ def _counts(rate: Fraction) -> bool:
 def of_colours(clip: Clip) -> Metadata:
     """Return the colour tags of a clip as OpenImageIO's attributes."""
     tags = clip.stated.tags
-    found: list[tuple[str, Any, Any]] = []
+    metadata: list[tuple[str, Any, Any]] = []
     if name := interop_name(tags):
-        found.append(("oiio:ColorSpace", "string", name))
+        metadata.append(("oiio:ColorSpace", "string", name))
     if xy := chromaticities(tags.primaries):
-        found.append(("chromaticities", "float[8]", xy))
+        metadata.append(("chromaticities", "float[8]", xy))
     if tags.known:
-        found.append(("CICP", "int[4]", (tags.primaries, tags.transfer, 0, 1)))
-    return tuple(found)
+        metadata.append(("CICP", "int[4]", (tags.primaries, tags.transfer, 0, 1)))
+    return tuple(metadata)
 
 
 def frame_notes(clip: Clip, extension: str) -> list[str]:

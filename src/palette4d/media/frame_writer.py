@@ -170,7 +170,7 @@ def sample_type(extension: str, depth: str, *, half: bool = False, bits: int | N
     if bits not in fitting:
         raise OutputError(
             f"found {bits} bits for {extension.upper()}, expected "
-            + " or ".join(str(one) for one in fitting)
+            + " or ".join(str(kind) for kind in fitting)
         )
     return "float" if bits == 32 else f"uint{bits}"
 

@@ -181,7 +181,7 @@ def _channel_choice(spec: Any) -> list[int]:
         return [grey] * 3 + (alpha if colours else [])
     for red in names:  # a layer: diffuse.R, diffuse.G, diffuse.B
         if red.endswith(".R") and {red[:-1] + "G", red[:-1] + "B"} <= set(names):
-            layer = [names.index(red[:-1] + one) for one in "RGB"]
+            layer = [names.index(red[:-1] + channel) for channel in "RGB"]
             return layer + ([names.index(red[:-1] + "A")] if red[:-1] + "A" in names else [])
     return colours[:3] + alpha
 

@@ -11,9 +11,9 @@ _MOST = 64
 
 def boxes(file: BinaryIO) -> Iterator[tuple[bytes, int]]:
     """Yield the kind of each box and the size of its content; the file is at the content."""
-    at = 0
+    offset = 0
     for _ in range(_MOST):
-        file.seek(at)
+        file.seek(offset)
         head = file.read(8)
         if len(head) < 8:
             return
@@ -23,4 +23,4 @@ def boxes(file: BinaryIO) -> Iterator[tuple[bytes, int]]:
         yield kind, max(size - read, 0)
         if size < read:  # up to the file's end
             return
-        at += size
+        offset += size

@@ -154,7 +154,7 @@ def varies(stamps: list[int], base: Fraction, rate: Fraction | None) -> bool:
     # A stream that was trimmed without encoding lacks pictures at its ends, which others need.
     usual = max(1.0, float(np.median(gaps)))
     whole = np.abs(gaps - np.rint(gaps / usual) * usual) <= allowed
-    at = np.arange(len(gaps))
-    ends = np.logical_or(at < REORDERED, at >= len(gaps) - REORDERED)
+    index = np.arange(len(gaps))
+    ends = np.logical_or(index < REORDERED, index >= len(gaps) - REORDERED)
     lacks = whole & (gaps > 1.5 * usual) & ends
     return bool(np.ptp(gaps[~lacks]) > allowed) if not lacks.all() else False

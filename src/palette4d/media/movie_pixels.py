@@ -31,9 +31,9 @@ def _newer(cls: type[Type], value: int) -> Type:
 
     Else PyAV raises an error for all side data of the frame, its display matrix too.
     """
-    found: Any = object.__new__(cls)
-    found._value_, found._name_ = value, f"TYPE_{value}"
-    return cast(Type, found)
+    made: Any = object.__new__(cls)
+    made._value_, made._name_ = value, f"TYPE_{value}"
+    return cast(Type, made)
 
 
 Type._missing_ = classmethod(_newer)  # type: ignore[assignment] # mypy: no method is assigned
@@ -46,7 +46,7 @@ def turn(picture: av.VideoFrame) -> tuple[bool, bool, bool]:
     (a, b, u), (c, d, v), (x, y, w): the point (x, y) is shown at (ax + cy, bx + dy).
     """
     every: Any = picture.side_data
-    stated = next((one for one in every if one.type == Type.DISPLAYMATRIX), None)
+    stated = next((entry for entry in every if entry.type == Type.DISPLAYMATRIX), None)
     if stated is None:
         return False, False, False
     a, b, _, c, d = np.frombuffer(bytes(stated), "=i4")[:5].tolist()

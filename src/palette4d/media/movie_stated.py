@@ -68,9 +68,9 @@ def stated_by(container: Any, stream: Any, picture: av.VideoFrame) -> Stated:
 def _hdr10(picture: av.VideoFrame) -> str:
     """Return the static metadata of HDR10 (SMPTE ST 2086, CTA-861.3) as x265 takes them."""
     every: Any = picture.side_data
-    found = {one.type: bytes(one) for one in every}
+    by_type = {entry.type: bytes(entry) for entry in every}
     texts = []
-    if (display := found.get(Type.MASTERING_DISPLAY_METADATA)) is not None:
+    if (display := by_type.get(Type.MASTERING_DISPLAY_METADATA)) is not None:
         # Ten fractions: x and y of red, green, blue and white, least and largest luminance.
         pairs = np.frombuffer(display[:80], "=i4").reshape(10, 2).astype(float)
         numbers = np.divide(pairs[:, 0], pairs[:, 1], where=pairs[:, 1] != 0, out=np.zeros(10))
@@ -79,7 +79,7 @@ def _hdr10(picture: av.VideoFrame) -> str:
         )
         low, high = numbers[8:] * 10_000
         texts.append(f"master-display=G{g}B{b}R{r}WP{white}L({high:.0f},{low:.0f})")
-    if (light := found.get(Type.CONTENT_LIGHT_LEVEL)) is not None:
+    if (light := by_type.get(Type.CONTENT_LIGHT_LEVEL)) is not None:
         texts.append("max-cll={},{}".format(*np.frombuffer(light[:8], "=u4").tolist()))
     return ":".join(texts)
 
@@ -89,10 +89,10 @@ def timecode_of(container: Any, rate: Fraction | None) -> str:
 
     It counts at the movie's rate. The track of a file may count pairs of frames (SMPTE ST 12-1).
     """
-    found = _TIMECODE.search(_first(container, "timecode"))
-    if found is None:
+    match = _TIMECODE.search(_first(container, "timecode"))
+    if match is None:
         return ""
-    text, base = found[0], nominal(rate) if rate else 0
+    text, base = match[0], nominal(rate) if rate else 0
     counted = _counted_by_track(container.name.removeprefix("file:")) if base > 30 else 0
     if 0 < counted < base and base % counted == 0:
         return f"{text[:9]}{int(text[9:]) * (base // counted):02d}"
@@ -111,15 +111,17 @@ def _counted_by_track(path: str) -> int:
         return 0
     # QuickTime File Format, "Timecode sample description": time scale and a frame's duration.
     # FFmpeg counts at their ratio and ignores the number of frames that follows.
-    found = re.search(rb"stsd.{12}tmcd.{16}(.{4})(.{4})", head, re.DOTALL)
-    scale, duration = (int.from_bytes(one, "big") for one in found.groups()) if found else (0, 0)
+    match = re.search(rb"stsd.{12}tmcd.{16}(.{4})(.{4})", head, re.DOTALL)
+    scale, duration = (
+        (int.from_bytes(number, "big") for number in match.groups()) if match else (0, 0)
+    )
     return round(scale / duration) if duration else 0
 
 
 def _first(container: Any, name: str) -> str:
     """Return a text that the file or one of its streams states, or ""."""
     stated = [container.metadata, *(stream.metadata for stream in container.streams)]
-    return next((str(one[name]) for one in stated if one.get(name)), "")
+    return next((str(texts[name]) for texts in stated if texts.get(name)), "")
 
 
 def _fields(picture: av.VideoFrame, order: int) -> Fields:

@@ -120,7 +120,7 @@ class Delivery:
         held = _HELD[path.suffix.lower().lstrip(".")]
         if lost := [name for name, _ in stated.texts if name not in held]:
             notes.append(f"the movie does not keep of the clip's metadata: {', '.join(lost)}")
-        texts = tuple(one for one in stated.texts if one[0] in held)
+        texts = tuple(text for text in stated.texts if text[0] in held)
         return cls(
             chosen,
             dataclasses.replace(stated, tags=tags, texts=texts),

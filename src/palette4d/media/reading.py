@@ -48,11 +48,11 @@ def split(spec: str) -> tuple[str, Reading]:
     >>> split("a.####.exr?layer=diffuse")
     ('a.####.exr', Reading(layer='diffuse', view=None, matrix=None))
     """
-    found = _SUFFIX.search(spec)
-    if found is None:
+    match = _SUFFIX.search(spec)
+    if match is None:
         return spec, Reading()
-    given = dict(pair.split("=", 1) for pair in found[1].split("&"))
-    return spec[: found.start()], Reading(**given)
+    given = dict(pair.split("=", 1) for pair in match[1].split("&"))
+    return spec[: match.start()], Reading(**given)
 
 
 def read_as(spec: str, **asked: Any) -> str:

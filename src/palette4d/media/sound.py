@@ -50,18 +50,18 @@ class Sound:
         notes, streams = [], []
         with opened_movie(clip.path) as movie:
             video = movie.streams.best("video")
-            for one in movie.streams:
-                if one.index == video.index or "timecode" in one.metadata:
+            for stream in movie.streams:
+                if stream.index == video.index or "timecode" in stream.metadata:
                     continue  # timecode is written anew
-                if one.type == "audio" and _fits(one, extension):
-                    streams.append(one.index)
-                    if _encoded(one, extension):
+                if stream.type == "audio" and _fits(stream, extension):
+                    streams.append(stream.index)
+                    if _encoded(stream, extension):
                         notes.append("sound in PCM becomes AAC in .mp4; .mov keeps it as it is")
-                elif one.type == "audio":
-                    name = one.codec_context.name
+                elif stream.type == "audio":
+                    name = stream.codec_context.name
                     notes.append(f"sound in {name} is not copied: .{extension} cannot hold it")
                 else:
-                    notes.append(f"a stream of {one.type} is not copied")
+                    notes.append(f"a stream of {stream.type} is not copied")
         if streams and (clip.step != 1 or clip.stamps is None or clip.varies):
             why = "the frame rate varies" if clip.varies else "frames are left out"
             return cls(
@@ -85,12 +85,12 @@ class Sound:
         with opened_movie(self.path) as source:
             chosen = [source.streams[index] for index in self.streams]
             extension = "mp4" if "mp4" in movie.format.name else "mov"
-            targets = {one.index: _added(movie, one, extension) for one in chosen}
-            for one in chosen:
-                kept = {name: one.metadata[name] for name in _KEPT if name in one.metadata}
-                targets[one.index].metadata.update(kept)
+            targets = {stream.index: _added(movie, stream, extension) for stream in chosen}
+            for stream in chosen:
+                kept = {name: stream.metadata[name] for name in _KEPT if name in stream.metadata}
+                targets[stream.index].metadata.update(kept)
             packets = source.demux(chosen) if chosen else iter(())
-            encoded = {one.index for one in chosen if _encoded(one, extension)}
+            encoded = {stream.index for stream in chosen if _encoded(stream, extension)}
             yield Copier(self, targets, encoded, packets)
 
 
@@ -134,22 +134,22 @@ class Copier:
 
     def until(self, time: Fraction | None = None) -> Sequence[Any]:
         """Return the packets before a time of the new movie, or all that are left."""
-        found: list[Any] = []
+        packets: list[Any] = []
         while (packet := self._next()) is not None:
-            at = packet.pts * packet.time_base
-            if time is not None and at >= time:
+            time_of_packet = packet.pts * packet.time_base
+            if time is not None and time_of_packet >= time:
                 self._held = packet
                 break
-            found += self._written(packet)
+            packets += self._written(packet)
         if time is None:
             for index in self._encoded:
-                found += self._targets[index].encode(None)
-        return found
+                packets += self._targets[index].encode(None)
+        return packets
 
     def _written(self, packet: Any) -> Sequence[Any]:
         target = self._targets[packet.stream_index]
         if packet.stream_index in self._encoded:
-            return [one for sound in packet.decode() for one in target.encode(sound)]
+            return [encoded for sound in packet.decode() for encoded in target.encode(sound)]
         packet.stream = target
         return [packet]
 
@@ -161,9 +161,9 @@ class Copier:
         for packet in self._packets:
             if packet.size == 0 or packet.pts is None:
                 continue
-            at = packet.pts * packet.time_base
-            if (sound.start is not None and at < sound.start) or (
-                sound.end is not None and at >= sound.end
+            time = packet.pts * packet.time_base
+            if (sound.start is not None and time < sound.start) or (
+                sound.end is not None and time >= sound.end
             ):
                 continue
             moved = round(sound.origin / packet.time_base)

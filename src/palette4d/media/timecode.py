@@ -35,15 +35,15 @@ def frames_of(timecode: str, rate: Fraction, drop: bool = False) -> int | None:
     >>> frames_of("00:01:00;00", Fraction(30)), frames_of("00:00:00:24", Fraction(24))
     (None, None)
     """
-    found = _PARTS.fullmatch(timecode.strip())
-    if found is None:
+    match = _PARTS.fullmatch(timecode.strip())
+    if match is None:
         return None
-    hours, minutes, seconds, frames = (int(found[i]) for i in (1, 2, 3, 5))
+    hours, minutes, seconds, frames = (int(match[i]) for i in (1, 2, 3, 5))
     base = nominal(rate)
     if minutes > 59 or seconds > 59 or frames >= base:
         return None
     count = ((hours * 60 + minutes) * 60 + seconds) * base + frames
-    if not (drop or found[4] != ":"):
+    if not (drop or match[4] != ":"):
         return count
     skipped = skipped_a_minute(rate)
     if minutes % 10 and not seconds and frames < skipped:
@@ -107,10 +107,10 @@ def start_timecode(clip: Clip, rate: Fraction | None = None) -> str | None:
             metadata = clip.load(frame).metadata
         except (Palette4dError, OSError):
             continue
-        found = timecode_in(metadata)
-        if frame != first and found:
-            found = moved(found, first - frame, rate or clip.rate)
-        return found or None
+        timecode = timecode_in(metadata)
+        if frame != first and timecode:
+            timecode = moved(timecode, first - frame, rate or clip.rate)
+        return timecode or None
     return None
 
 

@@ -83,8 +83,8 @@ def plot(
     if not isinstance(document, Document):
         document = Document.load(document)
     if output.exists():
-        found = find_clip(document.path or Path("document"), document.grade.core.clip, clip)
-        frames_of_clip = () if found is None else map(found.file, found.frames)
+        opened = find_clip(document.path or Path("document"), document.grade.core.clip, clip)
+        frames_of_clip = () if opened is None else map(opened.file, opened.frames)
         refuse_existing(output, force, inputs=(document.path, *frames_of_clip))
     graded = document.version(version)
     sidecar = graded.grade.core

@@ -72,10 +72,10 @@ def _representing(clip: ClipColours, times: Sequence[float], *, alike: bool) -> 
     return [times[k] for k in kept]
 
 
-def _mean_distance(one: F64, other: F64) -> float:
+def _mean_distance(before: F64, after: F64) -> float:
     """Return the mean distance of a pixel's colour in one picture to one in another."""
-    shares = [rgbw[:, 3] / rgbw[:, 3].sum() for rgbw in (one, other)]
-    apart = np.linalg.norm(one[:, None, :3] - other[None, :, :3], axis=2)
+    shares = [rgbw[:, 3] / rgbw[:, 3].sum() for rgbw in (before, after)]
+    apart = np.linalg.norm(before[:, None, :3] - after[None, :, :3], axis=2)
     return float(shares[0] @ apart @ shares[1])
 
 

@@ -197,9 +197,9 @@ class Timeline:
                 y += height * u * u * (3 - 2 * u)
         # Equal steps along the line, not along time: finer where the line is steep.
         along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
-        at = np.linspace(0, along[-1], len(x) // 4 + 1)
-        points = np.stack([np.interp(at, along, x), np.interp(at, along, y)], axis=-1)
-        return np.interp(at, along, np.linspace(times[0], times[1], len(x))), points
+        spread = np.linspace(0, along[-1], len(x) // 4 + 1)
+        points = np.stack([np.interp(spread, along, x), np.interp(spread, along, y)], axis=-1)
+        return np.interp(spread, along, np.linspace(times[0], times[1], len(x))), points
 
     def at(self, edge: int, frame: float) -> tuple[float, float]:
         """Return the point of an edge at a time."""
@@ -210,13 +210,13 @@ class Timeline:
 
     def edge_near(self, x: float, y: float, reach: float) -> int | None:
         """Return the edge whose band is nearest to a point, within `reach` up and down."""
-        found, least = None, reach
+        nearest, least = None, reach
         for edge, (_, points) in self.paths.items():
             if points[0, 0] <= x <= points[-1, 0]:
                 away = abs(float(np.interp(x, points[:, 0], points[:, 1])) - y)
                 if away <= least:
-                    found, least = edge, away
-        return found
+                    nearest, least = edge, away
+        return nearest
 
     def discs(self, low: float, high: float) -> list[Disc]:
         """Return the vertices and then the stops; of more stops than units of width, some.
@@ -429,8 +429,8 @@ def disc_names(
         if beside is not None and disc.home in beside[:2] and away + 2 * half <= beside[2]:
             way = -1 if disc.home == beside[0] else 1
             places.insert(0, (disc.x + way * (away + half), disc.y))
-        found = (place for place in places if free(boxed(text, *place)))
-        for x, y in itertools.islice(found, 1):
+        free_places = (place for place in places if free(boxed(text, *place)))
+        for x, y in itertools.islice(free_places, 1):
             take("name", disc.id, boxed(text, x, y))
             labels[disc.id] = Label(text, x, y, disc.kind != "plain")
     for disc in order if longer else ():
@@ -474,7 +474,7 @@ def names_around(
     for disc in discs:
         reach = disc.radius + COLLAR / 2
         boxes.append((disc.x - reach, disc.y - reach, disc.x + reach, disc.y + reach))
-    found = []
+    names = []
     turns = np.linspace(0, 2 * np.pi, DIRECTIONS, endpoint=False)
     ways = np.stack([np.cos(turns), np.sin(turns)], axis=-1)
     for disc in sorted(discs, key=lambda disc: disc.kind == "plain"):
@@ -490,11 +490,11 @@ def names_around(
             box = (x - half, y - tall, x + half, y + tall)
             if not any(meet(box, other) for other in boxes):
                 boxes.append(box)
-                found.append((Label(disc.id, float(x), float(y), disc.kind != "plain"), disc))
+                names.append((Label(disc.id, float(x), float(y), disc.kind != "plain"), disc))
                 break
-    return found
+    return names
 
 
-def meet(one: Box, two: Box) -> bool:
+def meet(a: Box, b: Box) -> bool:
     """Whether two boxes overlap."""
-    return one[0] < two[2] and two[0] < one[2] and one[1] < two[3] and two[1] < one[3]
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]

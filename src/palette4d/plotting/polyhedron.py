@@ -70,11 +70,11 @@ def draw(axes: Any, shape: Shape, view: View, encoding: str, ids: Sequence[str] 
     arrow |= {"linewidth": 1.2, "shrinkA": 6, "shrinkB": 0}
     for index in moved:
         axes.annotate("", xy=after[index], xytext=points[index], arrowprops=arrow, zorder=8)
-    both = np.stack([colours, style.shown(shape.edited, encoding)], axis=1)
+    before_and_after = np.stack([colours, style.shown(shape.edited, encoding)], axis=1)
     for index in np.argsort(seen[:, 2], kind="stable"):
         kind, radius = EDITED if index in moved else PLAIN
         x, y = points[index].tolist()
-        disc(axes, x, y, radius, both[index], kind, 9)
+        disc(axes, x, y, radius, before_and_after[index], kind, 9)
     _draw_ids(axes, points, shape, set(moved), ids, letters)
 
 
@@ -94,10 +94,10 @@ def _draw_ids(
         discs.append(Disc(style.printable(id_, 14), kind, 0.0, -1, x, -y, radius, x, *colours))
     taken = [(x - 4, -y - 4, x + 4, -y + 4) for x, y in letters]
     width = functools.partial(timeline.text_width, size=ID_SIZE)
-    for name, of in names_around(discs, ID_SIZE, width, taken):
+    for name, named in names_around(discs, ID_SIZE, width, taken):
         # The id covers the line's other half.
         line = {"color": style.GUIDE, "linewidth": 0.6, "zorder": 8.9}
-        axes.plot([of.x, name.x], [-of.y, -name.y], **line)
+        axes.plot([named.x, name.x], [-named.y, -name.y], **line)
         timeline.draw_id(axes, name, -name.y, ID_SIZE, style.PAGE)
 
 
@@ -113,7 +113,7 @@ def _draw_cube(axes: Any, view: View) -> list[tuple[float, float]]:
     places = []
     for bit, name in ((1, "R"), (2, "G"), (4, "B")):
         away = corners[bit, :2] - corners[0, :2]
-        at = corners[bit, :2] + 9 * away / max(float(np.linalg.norm(away)), 1e-9)
-        axes.text(*at, name, zorder=8, **style.CENTRED | {"fontsize": 7.5, "color": style.TEXT})
-        places.append((float(at[0]), float(at[1])))
+        place = corners[bit, :2] + 9 * away / max(float(np.linalg.norm(away)), 1e-9)
+        axes.text(*place, name, zorder=8, **style.CENTRED | {"fontsize": 7.5, "color": style.TEXT})
+        places.append((float(place[0]), float(place[1])))
     return places

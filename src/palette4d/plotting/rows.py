@@ -129,9 +129,9 @@ class PlottedPalette:
             after[cut.edges[inside], k] = _core.edited_colours(polytope, edits, cut)[inside]
         for end in (0, 1):
             vertices = np.array([edge[end] for edge in self.edges], dtype=np.int64)
-            which, at = np.nonzero(self.frames[vertices][:, None] == np.asarray(frames)[None])
-            before[which, at] = self.rgb[vertices[which]]
-            after[which, at] = self.edited[vertices[which]]
+            which, column = np.nonzero(self.frames[vertices][:, None] == np.asarray(frames)[None])
+            before[which, column] = self.rgb[vertices[which]]
+            after[which, column] = self.edited[vertices[which]]
         return before, after
 
     def colours(self, edge: int, frames: F64, *, edited: bool) -> F64:
@@ -154,21 +154,21 @@ class PlottedPalette:
     def change(self, frames: F64) -> F64:
         """Return by how much colours change at (k,) times: the largest of a channel, (k,)."""
         before, after = self.sampled(frames)
-        found: F64 = np.nanmax(np.abs(after - before), axis=(0, 2))
+        largest: F64 = np.nanmax(np.abs(after - before), axis=(0, 2))
         picked = [self.sidecar.edits.picks_at(frame).largest for frame in frames.tolist()]
-        return np.maximum(found, picked)
+        return np.maximum(largest, picked)
 
 
 def track_ids(polytope: _core.Polytope) -> dict[str, str]:
     """Return the id of the track of every vertex and edge: that of the track's first one."""
     vertices = np.asarray(polytope.vertices, dtype=np.float64).reshape(-1, 4)
     edges = [(int(a), int(b)) for a, b in np.asarray(polytope.edges).reshape(-1, 2)]
-    found: dict[str, str] = {}
+    tracks: dict[str, str] = {}
     for chain in find_chains(vertices[:, 3], vertices[:, :3], edges)[0]:
         members = [polytope.vertex_ids[v] for v in chain.vertices]
         members += [polytope.edge_ids[e] for e in chain.edges]
-        found |= dict.fromkeys(members, members[0])
-    return found
+        tracks |= dict.fromkeys(members, members[0])
+    return tracks
 
 
 @dataclass(frozen=True)
@@ -242,9 +242,9 @@ def _order(cost: Cost, order: list[int]) -> list[int]:
             rest = [other for other in order if other != chain]
             for there in range(len(order)):
                 candidate = [*rest[:there], chain, *rest[there:]]
-                found = cost(np.argsort(candidate).astype(np.float64))
-                if found < best - 1e-9:
-                    best, order, improved = found, candidate, True
+                price = cost(np.argsort(candidate).astype(np.float64))
+                if price < best - 1e-9:
+                    best, order, improved = price, candidate, True
             trials += len(order)
             if trials >= MAX_TRIALS:
                 break
@@ -272,9 +272,9 @@ def _share_rows(chains: Sequence[Chain], order: Sequence[int], cost: Cost, gap: 
                 for kept, gone in ((a, b), (b, a)) if apart(rows[a], rows[b]) else ():
                     candidate = [rows[a] + rows[b] if k == kept else r for k, r in enumerate(rows)]
                     del candidate[gone]
-                    found = cost(_places(candidate).astype(np.float64))
-                    if found <= limit and (best is None or found < best[0]):
-                        best = found, candidate
+                    price = cost(_places(candidate).astype(np.float64))
+                    if price <= limit and (best is None or price < best[0]):
+                        best = price, candidate
         if best is None:
             return rows
         rows = best[1]

@@ -138,11 +138,11 @@ def concave(rgb: F64, faces: NDArray[np.int32]) -> NDArray[np.bool_]:
     edges, beside = edges_of(faces)
     result = np.zeros(len(edges), dtype=bool)
     inner = np.flatnonzero((beside >= 0).all(axis=1))
-    one, other = faces[beside[inner, 0]], faces[beside[inner, 1]]
-    a, b, c = np.moveaxis(rgb[one], 1, 0)
+    first, second = faces[beside[inner, 0]], faces[beside[inner, 1]]
+    a, b, c = np.moveaxis(rgb[first], 1, 0)
     normal = np.cross(b - a, c - a)
     # The other face's corner that is not on the edge.
-    apex = other.sum(axis=1) - edges[inner].sum(axis=1)
+    apex = second.sum(axis=1) - edges[inner].sum(axis=1)
     height = ((rgb[apex] - a) * normal).sum(axis=1)
     result[inner] = height / np.maximum(np.linalg.norm(normal, axis=1), 1e-12) > BENT
     return result
@@ -155,5 +155,5 @@ def flipped(before: F64, after: F64, faces: NDArray[np.int32]) -> NDArray[np.boo
         a, b, c = np.moveaxis(rgb[faces] - rgb.mean(axis=0), 1, 0)
         return np.asarray((np.cross(a, b) * c).sum(axis=-1))
 
-    one, two = volume(before), volume(after)
-    return (one * two < 0) & (np.abs(two) > 1e-9)
+    first, second = volume(before), volume(after)
+    return (first * second < 0) & (np.abs(second) > 1e-9)

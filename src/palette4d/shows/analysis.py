@@ -111,14 +111,14 @@ def analyze_shots(
         workers=Workers(jobs, cluster),
     )
     if is_timeline(name):
-        source, found, notes = _of_edit(Path(name), rate, media, handles, conform)
+        source, listed, notes = _of_edit(Path(name), rate, media, handles, conform)
     else:
         opened = open_clip(name, frames=frames, rate=rate, skip_bad_frames=skip_bad_frames)
-        found = shots.detect(opened, lambda done, total: tell("cuts", done, total))
+        listed = shots.detect(opened, lambda done, total: tell("cuts", done, total))
         source = Source(file_safe(opened.name), opened.source, "", opened.rate)
         notes = list(opened.notes)
     done = analyse(
-        source, found, folder, options, lambda done, total, words: tell(words, done, total)
+        source, listed, folder, options, lambda done, total, words: tell(words, done, total)
     )
     if notes:
         done.notes[""] = tuple(map(Message, notes))
@@ -126,7 +126,7 @@ def analyze_shots(
     if failed:
         lines = "\n".join(f"  {entry.shot.name}: {Message(entry.error).marked}" for entry in failed)
         raise UnfinishedError(
-            f"{counted(len(failed), 'shot')} of {len(found)} could not be analysed; the same "
+            f"{counted(len(failed), 'shot')} of {len(listed)} could not be analysed; the same "
             f"command tries only {'it' if len(failed) == 1 else 'these'} again:\n{lines}",
             done,
         )
@@ -144,7 +144,7 @@ def _of_edit(
     edit = timeline_clips.read(path, rate)
     folder = None if media is None else find_media.Folder(Path(media))
     listed, counting = timeline_shots.shots_of(edit, folder, handles, conform)
-    found, renamed = shots.numbered(listed)
+    named, renamed = shots.numbered(listed)
     notes = [f"not analysed: {note}" for note in edit.notes] + counting
     if timeline_files.is_edl(path) and rate is None:
         notes.append(
@@ -162,4 +162,4 @@ def _of_edit(
             f"{some_of(renamed)}"
         )
     source = Source(file_safe(path.stem), str(path), timeline_files.sha256(path), edit.rate)
-    return source, found, notes
+    return source, named, notes

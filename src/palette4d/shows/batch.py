@@ -114,8 +114,8 @@ def analyse(
 def _files(tasks: Iterable[ShotTask], config: str | None) -> list[Path]:
     """Return what the processes that analyse shots must read."""
     clips = dict.fromkeys(task.clip for task in tasks)
-    found = [path for clip in clips for path in files_of(clip)]
-    return found + files_of_config(config or os.environ.get("OCIO") or "")
+    files = [path for clip in clips for path in files_of(clip)]
+    return files + files_of_config(config or os.environ.get("OCIO") or "")
 
 
 class Show:
@@ -224,19 +224,19 @@ class Show:
         except Palette4dError:
             return None
         clip = document["clip"]
-        found = (int(clip["frames"]["first"]), int(clip["frames"]["last"]))
+        ends = (int(clip["frames"]["first"]), int(clip["frames"]["last"]))
         expected = {(shot.first, shot.last)}
         if before and before.frames and dataclasses.replace(before.shot, place=shot.place) == shot:
             expected.add(before.frames)
         same = (
             (self.same_options if before else not self.options.spaces.asked)
-            and found in expected
+            and ends in expected
             and clip["source"] == shot.clip
             and clip["frames"]["step"] == shot.step
             and document["generator"] == f"palette4d {_core.__version__}"
             and document["quality"]["options"] == self.options.analysis.recorded()
         )
-        return found if same else None
+        return ends if same else None
 
     def beside(self, clip: str) -> str:
         """Return a path relative to the folder, so that both may move together."""

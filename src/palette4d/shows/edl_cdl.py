@@ -31,10 +31,10 @@ class Cdl:
         return {"asc_sat": self.saturation, "asc_sop": sop}
 
     @classmethod
-    def of_metadata(cls, found: Any) -> Cdl | None:
+    def of_metadata(cls, fields: Any) -> Cdl | None:
         """Return the CDL of `metadata`; None if it is none."""
         try:
-            sop, sat = found["asc_sop"], float(found["asc_sat"])
+            sop, sat = fields["asc_sop"], float(fields["asc_sat"])
             triples = [tuple(map(float, sop[name])) for name in ("slope", "offset", "power")]
         except (KeyError, TypeError, ValueError):
             return None
@@ -60,20 +60,20 @@ def is_cdl(comment: str) -> bool:
 def of_comments(comments: Iterable[str]) -> Cdl | None:
     """Return the CDL of an event's comments; None without one, or if it cannot be read."""
     slope, offset, power = Cdl.slope, Cdl.offset, Cdl.power
-    saturation, found = 1.0, False
+    saturation, stated = 1.0, False
     for comment in comments:
         if match := _SOP.match(comment):
             numbers = _numbers(match[1])
             if len(numbers) != 9:
                 return None
             slope, offset, power = ((numbers[i], numbers[i + 1], numbers[i + 2]) for i in (0, 3, 6))
-            found = True
+            stated = True
         elif match := _SAT.match(comment):
             numbers = _numbers(match[1])
             if len(numbers) != 1:
                 return None
-            saturation, found = numbers[0], True
-    return Cdl(slope, offset, power, saturation) if found else None
+            saturation, stated = numbers[0], True
+    return Cdl(slope, offset, power, saturation) if stated else None
 
 
 def _numbers(text: str) -> list[float]:

@@ -70,7 +70,11 @@ class Item:
                 f"{self.name} {self.before.reel} {self.channel} C 0 0 {begin} {begin}",
                 f"{self.name} {line.reel} {self.channel} {line.kind} {line.length} {times}",
             ]
-        kept = (one for one in self.comments if not (is_motion(one) or edl_cdl.is_cdl(one)))
+        kept = (
+            comment
+            for comment in self.comments
+            if not (is_motion(comment) or edl_cdl.is_cdl(comment))
+        )
         return "\n".join([*lines, *kept, f"* {MARK}{self.place}"])
 
 
@@ -93,9 +97,9 @@ def items_of(events: Sequence[Event], rate: Fraction) -> list[Item]:
             if out is not None and not out.is_black and not _continues(last.get(channel), out):
                 comments = tuple(_named_before(event))
                 own = Event((out,), comments, event.place)
-                found = Item(len(items), out, motion_of(own, rate), comments, channel, None)
-                items.append(found)
-                last[channel] = found
+                item = Item(len(items), out, motion_of(own, rate), comments, channel, None)
+                items.append(item)
+                last[channel] = item
             if channel in last:  # the adapter refuses a transition from nothing
                 before = out or last[channel].line
         comments = tuple(_named(event))

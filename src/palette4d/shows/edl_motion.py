@@ -108,23 +108,23 @@ def _misfit(media: int, frames: int, speed: float) -> str:
 
 def _speeds(event: Event, rate: Fraction) -> list[tuple[float, int | None]]:
     """Return (speed, first frame) of each line M2 that belongs to the event's own clip."""
-    found = []
+    speeds = []
     for comment in event.comments:
         if match := _M2.fullmatch(comment):
-            at = frames_of(match[3] or "", rate, bool(event.own.drops))
-            found.append(("_".join((match[1] or "").split()), _speed(float(match[2]), rate), at))
-    if len(event.lines) == 2 and len(found) > 1:
+            time = frames_of(match[3] or "", rate, bool(event.own.drops))
+            speeds.append(("_".join((match[1] or "").split()), _speed(float(match[2]), rate), time))
+    if len(event.lines) == 2 and len(speeds) > 1:
         before, own = event.lines
         # Of two clips in a transition, the one before may state its speed again.
         others = [(reel, before.source[0]) for reel in (before.reel, "")]
-        found = [one for one in found if (one[0], one[2]) not in others] or found[-1:]
-        found = [one for one in found if one[0] in (own.reel, "")] or found[-1:]
-    elif len(event.lines) == 2 and found:
+        speeds = [one for one in speeds if (one[0], one[2]) not in others] or speeds[-1:]
+        speeds = [one for one in speeds if one[0] in (own.reel, "")] or speeds[-1:]
+    elif len(event.lines) == 2 and speeds:
         before, own = event.lines
-        at = found[0][2]
-        if at == before.source[0] != own.source[0] and found[0][0] == before.reel:
-            found = []
-    return [(speed, at) for _, speed, at in found]
+        time = speeds[0][2]
+        if time == before.source[0] != own.source[0] and speeds[0][0] == before.reel:
+            speeds = []
+    return [(speed, time) for _, speed, time in speeds]
 
 
 def _speed(fps: float, rate: Fraction) -> float:

@@ -146,10 +146,10 @@ def events_of(text: str, rate: Fraction) -> list[Event]:
     Palette4dError
         A line is no event, or has a timecode that the rate does not have.
     """
-    found: list[Event] = []
+    events: list[Event] = []
     for block, comments, place in _blocks(text, rate):
-        found += [Event(lines, comments, place) for lines in _pairs(block)]
-    return _past_midnight(found, rate)
+        events += [Event(lines, comments, place) for lines in _pairs(block)]
+    return _past_midnight(events, rate)
 
 
 def _past_midnight(events: list[Event], rate: Fraction) -> list[Event]:
@@ -269,12 +269,12 @@ def _count(time: str, index: int, rate: Fraction, drop: bool) -> int:
     """Return a timecode in frames. With FCM: DROP FRAME colons drop numbers, too, if they can."""
     if time.isdigit():
         return int(time)
-    found = frames_of(time, rate, drop)
-    if found is None and drop:
-        found = frames_of(time, rate)
-    if found is None:
+    count = frames_of(time, rate, drop)
+    if count is None and drop:
+        count = frames_of(time, rate)
+    if count is None:
         raise Palette4dError(
             f"line {index}: found the timecode {time}, which {float(rate):.6g} frames per second "
             f"do not have; name the rate of the EDL's timecodes with {Arg('rate')}"
         )
-    return found
+    return count

@@ -262,20 +262,20 @@ def config(
 
 def sidecars(paths: Iterable[Path]) -> tuple[list[Path], list[str]]:
     """Return the given sidecars and the manifests' sidecars, and notes on shots without one."""
-    found: list[Path] = []
+    files: list[Path] = []
     notes = []
     for path in paths:
         if not manifests.is_manifest(path):
-            found.append(path)
+            files.append(path)
             continue
         done, others = manifests.sidecars(path)
-        found += done
+        files += done
         if others:
             notes.append(
                 f"{path}: {counted(len(others), 'shot')} not analysed and left out: "
                 f"{some_of(others)}"
             )
-    return found, notes
+    return files, notes
 
 
 def _file(source: Source) -> Path:

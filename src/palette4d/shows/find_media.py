@@ -65,8 +65,8 @@ class Folder:
         self._by_name: dict[str, list[Path]] = {}
         for folder, folders, files in os.walk(path):
             folders.sort()
-            for found in _in_folder(Path(folder), sorted(files)):
-                self._by_name.setdefault(_plain(found.name), []).append(found)
+            for file in _in_folder(Path(folder), sorted(files)):
+                self._by_name.setdefault(_plain(file.name), []).append(file)
 
     def find(self, names: Iterable[str]) -> Path | None:
         """Return the media for the first of the names that exists.
@@ -76,11 +76,11 @@ class Folder:
         """
         for name in names:
             path = Path(name.replace("\\", "/"))  # an EDL may name the whole path of another system
-            found = self._by_name.get(_plain(path.name), [])
-            same = [f for f in found if f.suffix.lower() == path.suffix.lower()]
-            if best := _most_alike(same or found, path):
+            files = self._by_name.get(_plain(path.name), [])
+            same = [f for f in files if f.suffix.lower() == path.suffix.lower()]
+            if best := _most_alike(same or files, path):
                 if len(best) > 1:
-                    listed = " and ".join(str(one) for one in best[:4])
+                    listed = " and ".join(str(file) for file in best[:4])
                     raise Palette4dError(
                         f"found {len(best)} media named {path.name!r} under {self.path}: {listed}; "
                         "expected one, keep the others out of the folder"
@@ -120,21 +120,21 @@ def _plain(name: str) -> str:
     return stem.lower()
 
 
-def _most_alike(found: list[Path], path: Path) -> list[Path]:
+def _most_alike(files: list[Path], path: Path) -> list[Path]:
     """Return the media whose folders agree longest with a path's folders, from the file upwards."""
-    if len(found) < 2:
-        return found
+    if len(files) < 2:
+        return files
 
-    def agreement(one: Path) -> int:
+    def agreement(file: Path) -> int:
         count = 0
-        for a, b in zip(reversed(one.parent.parts), reversed(path.parent.parts), strict=False):
+        for a, b in zip(reversed(file.parent.parts), reversed(path.parent.parts), strict=False):
             if a.lower() != b.lower():
                 break
             count += 1
         return count
 
-    most = max(agreement(one) for one in found)
-    return [one for one in found if agreement(one) == most]
+    most = max(agreement(file) for file in files)
+    return [file for file in files if agreement(file) == most]
 
 
 def as_clip(path: Path) -> str | None:

@@ -159,18 +159,18 @@ def _on_farm(
     done = Rendered([], [], [], [*warnings, *notes], sorted(set(clip.frames) - set(todo)))
     failed: dict[int, str] = {}
 
-    def take(row: tuple[int, ...], found: Files | Failed) -> None:
-        if isinstance(found, Failed):
-            failed[row[0]] = found.text
+    def take(row: tuple[int, ...], answer: Files | Failed) -> None:
+        if isinstance(answer, Failed):
+            failed[row[0]] = answer.text
             return
-        for frame, content in found.content.items():
+        for frame, content in answer.content.items():
             path = pattern.path(frame)
             with replacing(path, force=True) as temporary:
                 temporary.write_bytes(content)
             done.frames.append(frame)
             done.files.append(path)
-        done.skipped.extend(found.skipped)
-        done.filled.extend(found.filled)
+        done.skipped.extend(answer.skipped)
+        done.filled.extend(answer.filled)
         if progress is not None:
             progress(len(done.frames), len(todo))
 

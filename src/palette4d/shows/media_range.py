@@ -76,12 +76,12 @@ class Shown:
 
 def rate_of(rate: float) -> Fraction:
     """Return a rate of OpenTimelineIO's; `Palette4dError` if it is none."""
-    found = as_rate(rate)
-    if found is None:
+    known = as_rate(rate)
+    if known is None:
         raise Palette4dError(
             f"found the rate {rate:g}, expected frames per second above 0; mend it in the edit"
         )
-    return found
+    return known
 
 
 def own_rate(range_: Any) -> Fraction:
@@ -152,8 +152,8 @@ def _moved(window: _Range, by: Fraction) -> _Range:
     return window[0] + by, window[1] + by
 
 
-def _common(one: _Range, other: _Range) -> _Range | None:
-    start, end = max(one[0], other[0]), min(one[1], other[1])
+def _common(first: _Range, second: _Range) -> _Range | None:
+    start, end = max(first[0], second[0]), min(first[1], second[1])
     return None if end <= start else (start, end)
 
 

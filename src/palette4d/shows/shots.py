@@ -152,11 +152,11 @@ def cuts_of(clip: Clip, progress: Callable[[int, int], object] | None = None) ->
     def histograms() -> Iterator[tuple[int, cuts.F64, bool]]:
         for done, image in enumerate(clip.iter_images(), start=1):
             tell(done, len(clip.frames))
-            found = colour_statistics.gather(
+            statistics = colour_statistics.gather(
                 image.frame, clip.straight_colours(image.pixels), options
             )
-            if found is not None:
-                yield image.frame, found.histogram, hidden(image.pixels)
+            if statistics is not None:
+                yield image.frame, statistics.histogram, hidden(image.pixels)
 
     frames = histograms()
     shown: list[tuple[int, cuts.F64]] = []  # the first frame with a visible pixel

@@ -44,7 +44,7 @@ def of_shots(manifest: Manifest, exported: Mapping[str, Series]) -> dict[str, Cd
         if not rows:
             continue
         middle = sum(entry.shot.used) / 2
-        row = min(rows, key=lambda one: (abs(one["frame"] - middle), one["frame"]))
+        row = min(rows, key=lambda look: (abs(look["frame"] - middle), look["frame"]))
         read = cdls.read(series.index.parent / row["file"])
         found[entry.shot.name] = Cdl(read.slope, read.offset, read.power, read.saturation)
     return found

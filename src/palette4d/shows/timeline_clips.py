@@ -133,8 +133,8 @@ class _Walk:
             )
         return EditList(self.path, self.rate, tuple(self.clips), notes)
 
-    def passed_over(self, one: str, several: str) -> None:
-        key = (one, several)
+    def passed_over(self, single: str, several: str) -> None:
+        key = (single, several)
         self.others[key] = self.others.get(key, 0) + 1
 
     def walk(self, levels: tuple[Level, ...], path: tuple[int, ...], track: str) -> None:
@@ -227,11 +227,11 @@ class _Walk:
         if time is None:
             return ""
         opentime, start = self.otio.opentime, self.timeline.global_start_time
-        at = (time + (seconds(start) if start else 0)) * self.rate
-        frame = math.floor(at + media_range.ROUNDING)
+        count = (time + (seconds(start) if start else 0)) * self.rate
+        frame = math.floor(count + media_range.ROUNDING)
         known = opentime.RationalTime.is_smpte_timecode_rate(float(self.rate))
         if not known or frame < 0:
-            return f"{float(at):g}"
+            return f"{float(count):g}"
         drops = _stated(self.timeline, "drop_frame", bool)
         if drops is None:
             drops = self.rate.denominator == 1001 and nominal(self.rate) % 30 == 0
@@ -255,10 +255,10 @@ def _end(place: Fraction | str, item: Any) -> Fraction | str:
 def _stated(item: Any, name: str, kind: type[Of]) -> Of | None:
     """Return a member of the EDL's metadata of a clip or a timeline; None without one."""
     try:
-        found = item.metadata[NAMESPACE][name]
+        value = item.metadata[NAMESPACE][name]
     except (KeyError, TypeError):
         return None
-    return found if isinstance(found, kind) else None
+    return value if isinstance(value, kind) else None
 
 
 def _first_rate(timeline: Any) -> Fraction:

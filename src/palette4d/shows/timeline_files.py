@@ -97,22 +97,22 @@ def load(path: Path, rate: Fraction | None = None) -> Any:
     otio = library()
     if is_edl(path):
         return edl_timeline.timeline_of(path, read_regular(path, LARGEST_FILE), rate, otio)
-    found = otio.adapters.read_from_file(str(path))
-    if isinstance(found, otio.schema.SerializableCollection):
-        timelines = [one for one in found if isinstance(one, otio.schema.Timeline)]
+    timeline = otio.adapters.read_from_file(str(path))
+    if isinstance(timeline, otio.schema.SerializableCollection):
+        timelines = [child for child in timeline if isinstance(child, otio.schema.Timeline)]
         if len(timelines) != 1:
             raise Palette4dError(
                 f"{path}: found a collection of {counted(len(timelines), 'timeline')}, expected "
                 "one; write the timeline to a file of its own"
             )
-        found = timelines[0]
-    if not isinstance(found, otio.schema.Timeline):
-        known = isinstance(found, otio.core.SerializableObject)
-        what = f"an object of the type {type(found).__name__}" if known else "no OTIO_SCHEMA"
+        timeline = timelines[0]
+    if not isinstance(timeline, otio.schema.Timeline):
+        known = isinstance(timeline, otio.core.SerializableObject)
+        what = f"an object of the type {type(timeline).__name__}" if known else "no OTIO_SCHEMA"
         raise Palette4dError(
             f"{path}: found {what}, expected a timeline; write the edit to a file as a whole"
         )
-    return found
+    return timeline
 
 
 def as_json(path: Path, rate: Fraction) -> str:

@@ -112,13 +112,15 @@ def _document(source: Path, rate: Fraction) -> Any:
 
 def _timeline(document: Any, source: Path) -> Any:
     """Return the timeline of a document: the document itself, or the only one in a collection."""
-    found = [document]
+    timelines = [document]
     if str(document.get("OTIO_SCHEMA", "")).startswith("SerializableCollection."):
-        found = document["children"]
-    found = [one for one in found if str(one.get("OTIO_SCHEMA", "")).startswith("Timeline.")]
-    if len(found) != 1:
-        raise Palette4dError(f"{source}: found {len(found)} timelines, expected one")
-    return found[0]
+        timelines = document["children"]
+    timelines = [
+        child for child in timelines if str(child.get("OTIO_SCHEMA", "")).startswith("Timeline.")
+    ]
+    if len(timelines) != 1:
+        raise Palette4dError(f"{source}: found {len(timelines)} timelines, expected one")
+    return timelines[0]
 
 
 def _clip(timeline: Any, entry: Entry, source: Path) -> Any:
@@ -147,7 +149,7 @@ def _metadata(item: Any) -> Any:
 
 def _references(entry: Entry, shots: Path, series: Series | None, folder: Path) -> dict[str, Any]:
     assert entry.frames is not None
-    found: dict[str, Any] = {
+    references: dict[str, Any] = {
         "version": VERSION,
         "shot": entry.shot.name,
         "sidecar": _seen_from(folder, shots / entry.sidecar),
@@ -156,13 +158,13 @@ def _references(entry: Entry, shots: Path, series: Series | None, folder: Path) 
     }
     if series is not None:
         listed = {*series.baked, *series.kept}
-        found["series"] = _seen_from(folder, series.index)
-        found["luts"] = [
+        references["series"] = _seen_from(folder, series.index)
+        references["luts"] = [
             {"frame": row["frame"], "file": _seen_from(folder, series.index.parent / row["file"])}
             for row in series.document["frames"]
             if row["frame"] in listed
         ]
-    return found
+    return references
 
 
 def _seen_from(folder: Path, file: Path) -> str:

@@ -152,10 +152,10 @@ class _Finder:
                 self.media[spec] = f"{spec}: the media is unusable: {error}"
             except Palette4dError as error:
                 self.media[spec] = str(error)
-        found = self.media[spec]
-        if isinstance(found, str):
-            raise Palette4dError(found)
-        return found
+        media = self.media[spec]
+        if isinstance(media, str):
+            raise Palette4dError(media)
+        return media
 
     def found(self, clip: EditClip) -> str:
         """Find a clip's media: by name in the folder, else at the timeline's path."""
