@@ -8,6 +8,7 @@ import weakref
 
 import numpy as np
 import pytest
+from palette4d.analysis.convex_hulls import hull_mesh
 from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.losses import NO_FACES, minimise, refine_palette
 from palette4d.analysis.options import AnalysisOptions
@@ -29,6 +30,20 @@ def loss(points, palette, counts=None, k=1.0):
         tree(points, counts), np.asarray(palette, float), NO_FACES, _core.LossWeights(50.0, k)
     )
     return {"R": r, "C": c, "shape": shape, "outside": outside, "far": far}
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_distances_are_those_to_the_convex_hull(seed):
+    """As the weights of colours have them, which share no code with the losses."""
+    rng = np.random.default_rng(seed)
+    palette = rng.random((4 + seed % 6, 3))
+    points, counts = rng.uniform(-0.2, 1.2, (400, 3)), rng.integers(1, 8, 400).astype(float)
+    hull = hull_mesh(palette)
+    _, distance = _core.palette_weights(points, hull.rgb, hull.faces)
+    measured = loss(points, palette, counts)
+    assert measured["R"] == pytest.approx(counts @ distance / counts.sum(), abs=1e-9)
+    assert measured["outside"] == pytest.approx(counts @ (distance > 1e-6) / counts.sum())
+    assert measured["far"] == pytest.approx(distance.max(), abs=1e-9)
 
 
 def test_refinement_never_worsens_and_stays_in_its_box():

@@ -1,3 +1,4 @@
+// By hand, bits and refusals; tests/analysis/test_losses.py compares distances to any palette.
 #include "fit/palette_loss.hpp"
 
 #include <algorithm>
@@ -17,54 +18,6 @@ namespace {
 FrameLoss loss_of(const std::vector<Vec3>& colours, const std::vector<Vec3>& palette) {
     const ColourTree tree(colours, std::vector<double>(colours.size(), 1));
     return palette_loss(tree, palette, {}, {50, 1, 0}, nullptr);
-}
-
-double determinant(const Vec3& a, const Vec3& b, const Vec3& c) {
-    return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
-           a[2] * (b[0] * c[1] - b[1] * c[0]);
-}
-
-double to_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
-    const Vec3 d = b - a, r = p - a;
-    const double s = std::min(1.0, std::max(0.0, dot(r, d) / dot(d, d)));
-    const Vec3 rest{r[0] - s * d[0], r[1] - s * d[1], r[2] - s * d[2]};
-    return std::sqrt(dot(rest, rest));
-}
-
-double to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-    const Vec3 u = b - a, v = c - a, r = p - a;
-    // Least squares: r is near s u + t v.
-    const double uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), ru = dot(r, u), rv = dot(r, v);
-    const double gram = uu * vv - uv * uv;
-    const double s = (ru * vv - rv * uv) / gram, t = (rv * uu - ru * uv) / gram;
-    if (s >= 0 && t >= 0 && s + t <= 1) {
-        const Vec3 rest{r[0] - s * u[0] - t * v[0], r[1] - s * u[1] - t * v[1],
-                        r[2] - s * u[2] - t * v[2]};
-        return std::sqrt(dot(rest, rest));
-    }
-    return std::min({to_segment(p, a, b), to_segment(p, b, c), to_segment(p, c, a)});
-}
-
-bool in_tetrahedron(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
-    const Vec3 u = b - a, v = c - a, w = d - a, r = p - a;
-    const double whole = determinant(u, v, w);
-    const double x = determinant(r, v, w) / whole, y = determinant(u, r, w) / whole,
-                 z = determinant(u, v, r) / whole;
-    return x >= 0 && y >= 0 && z >= 0 && x + y + z <= 1;
-}
-
-/// Distance to the convex hull, which is the union of all tetrahedra of its corners; outside, the
-/// closest point lies on some triangle of corners.
-double distance_by_trying_all(const Vec3& p, const std::vector<Vec3>& v) {
-    double best = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < v.size(); ++i)
-        for (std::size_t j = i + 1; j < v.size(); ++j)
-            for (std::size_t k = j + 1; k < v.size(); ++k) {
-                best = std::min(best, to_triangle(p, v[i], v[j], v[k]));
-                for (std::size_t m = k + 1; m < v.size(); ++m)
-                    if (in_tetrahedron(p, v[i], v[j], v[k], v[m])) return 0;
-            }
-    return best;
 }
 
 }  // namespace
@@ -103,42 +56,6 @@ TEST(flat_lines_and_points_have_distances_too) {
     CHECK_NEAR(loss_of({{0.5, 0.5, 0.8}}, square).R, 0.3, 1e-15);
     CHECK_NEAR(loss_of({{1.3, 0.5, 0.9}}, square).R, 0.5, 1e-15);
     CHECK_EQUAL(loss_of({{0.25, 0.5, 0.5}}, square).R, 0.0);
-}
-
-TEST(distances_are_those_of_all_triangles_and_tetrahedra) {
-    shapes::Random random(1);
-    int outside = 0;
-    for (int i = 0; i < 400; ++i) {
-        std::vector<Vec3> palette;
-        for (int n = 4 + random.below(5); n > 0; --n) palette.push_back(random.colour());
-        const Vec3 p = random.colour(-0.2, 1.2);
-        const double expected = distance_by_trying_all(p, palette);
-        outside += expected > 0;
-        CHECK_NEAR(loss_of({p}, palette).R, expected, 1e-9);
-    }
-    CHECK(outside > 100 && outside < 390);
-}
-
-TEST(a_tree_of_many_colours_sums_what_single_colours_give) {
-    shapes::Random random(3);
-    const std::vector<Vec3> palette = shapes::random_convex(random, 9).rgb;
-    std::vector<Vec3> colours;
-    std::vector<double> counts;
-    double sum = 0, total = 0, outside = 0, far = 0;
-    for (int i = 0; i < 600; ++i) {
-        colours.push_back(random.colour());
-        counts.push_back(1 + random.below(7));
-        const double d = distance_by_trying_all(colours.back(), palette);
-        sum += counts.back() * d;
-        total += counts.back();
-        if (d > 1e-6) outside += counts.back();
-        far = std::max(far, d);
-    }
-    const ColourTree tree(colours, counts);
-    const FrameLoss loss = palette_loss(tree, palette, {}, {50, 1, 0}, nullptr);
-    CHECK_NEAR(loss.R, sum / total, 1e-9);
-    CHECK_NEAR(loss.outside, outside / total, 1e-12);
-    CHECK_NEAR(loss.max_distance, far, 1e-9);
 }
 
 TEST(every_instruction_set_gives_the_same_bits) {
