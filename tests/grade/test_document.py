@@ -153,6 +153,15 @@ def test_refusals_change_nothing(edited: Path, act: Any) -> None:
 # -------------------------------------------------------------------------------- what is seen
 
 
+def test_a_stop_takes_its_lock_along(edited: Path) -> None:
+    document = Document.load(edited)
+    document.lock("s1", "v4")
+    document.reset("s1")
+    assert document.grade.locks == ("v4",)
+    document.reset("v4")  # its colour; it still does not move
+    assert document.grade.locks == ("v4",)
+
+
 def test_the_edited_palette_is_matched(plain: Path) -> None:
     document = Document.load(plain)
     document.set("v2", rgb=(0.1, 0.9, 0.9))  # was red

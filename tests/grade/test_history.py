@@ -205,9 +205,12 @@ def test_no_step_takes_a_version_away(plain: Path) -> None:
     assert document.grade.versions == ("before crimson", "crimson")
     assert document.use_version("crimson") is None
     document.set("v1", rgb=(0, 1, 0))
+    document.change_version("crimson", note="for the client")
     assert document.save_version("crimson") == "former crimson"
     assert document.save_version("crimson") is None
     assert document.version("former crimson").grade.colour("v1") == (1, 0, 0)
+    assert document.grade.note("former crimson") == "for the client"
+    assert document.grade.note("crimson") == ""
 
 
 def test_a_removed_version_comes_back(plain: Path) -> None:

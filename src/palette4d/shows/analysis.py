@@ -1,4 +1,4 @@
-"""The analysis of many shots: of an edit, or of a movie that is split at its cuts."""
+"""The analysis of many shots: of a timeline, or of a movie that is split at its cuts."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ def analyze_shots(
     progress: Progress | None = None,
     **settings: object,
 ) -> Show:
-    """Analyse the shots of an edit, or of a movie or sequence with cuts.
+    """Analyse the shots of a timeline, or of a movie or sequence with cuts.
 
     Parameters
     ----------
     clip : str or path
-        An edit (.otio, .otioz, .otiod, .edl), or a name for `open_clip`, which is split at its
+        A timeline (.otio, .otioz, .otiod, .edl), or a name for `open_clip`, which is split at its
         cuts.
     folder : path
         The folder for a sidecar a shot, and the manifest NAME.shots.json. Shots that were analysed
@@ -63,11 +63,11 @@ def analyze_shots(
     rate : Fraction, optional
         Frames per second; of an EDL, those of its timecodes.
     media : path, optional
-        The folder with the edit's media, found by name; by default the edit's own paths.
+        The folder with the timeline's media, found by name; by default the timeline's own paths.
     handles : int
-        Head and tail frames around each shot of an edit.
+        Head and tail frames around each shot of a timeline.
     conform : {"by-rates", "frame-for-frame"}, optional
-        How an edit plays movies of another rate: in their own time, or each frame as one of its
+        How a timeline plays movies of another rate: in their own time, or each frame as one of its
         own. By default as docs/shots.md says.
     only : iterable of str
         The names of the shots to analyse; by default all.
@@ -86,14 +86,14 @@ def analyze_shots(
     -------
     Show
         ``path`` is the manifest; ``analysed`` and ``kept`` name the shots; ``notes`` are by shot,
-        those under "" are of the whole edit.
+        those under "" are of the whole timeline.
 
     Raises
     ------
     UnfinishedError
         Some shots failed; the others and the manifest are written.
     Palette4dError
-        The edit or the clip is unusable; nothing was analysed.
+        The timeline or the clip is unusable; nothing was analysed.
     """
     name, folder = os.fspath(clip), Path(folder)
     tell = progress or (lambda words, done, total: None)
@@ -111,7 +111,7 @@ def analyze_shots(
         workers=Workers(jobs, cluster),
     )
     if is_timeline(name):
-        source, listed, notes = _of_edit(Path(name), rate, media, handles, conform)
+        source, listed, notes = _of_timeline(Path(name), rate, media, handles, conform)
     else:
         opened = open_clip(name, frames=frames, rate=rate, skip_bad_frames=skip_bad_frames)
         listed = shots.detect(opened, lambda done, total: tell("cuts", done, total))
@@ -133,27 +133,27 @@ def analyze_shots(
     return done
 
 
-def _of_edit(
+def _of_timeline(
     path: Path,
     rate: Fraction | None,
     media: str | os.PathLike[str] | None,
     handles: int,
     conform: Conform | None,
 ) -> tuple[Source, list[Shot], list[str]]:
-    """Return an edit, its shots, and notes."""
-    edit = timeline_clips.read(path, rate)
+    """Return a timeline, its shots, and notes."""
+    timeline = timeline_clips.read(path, rate)
     folder = None if media is None else find_media.Folder(Path(media))
-    listed, counting = timeline_shots.shots_of(edit, folder, handles, conform)
+    listed, counting = timeline_shots.shots_of(timeline, folder, handles, conform)
     named, renamed = shots.numbered(listed)
-    notes = [f"not analysed: {note}" for note in edit.notes] + counting
+    notes = [f"not analysed: {note}" for note in timeline.notes] + counting
     if timeline_files.is_edl(path) and rate is None:
         notes.append(
             f"an EDL does not state its rate: 24 frames per second are assumed ({Arg('rate')})"
         )
-    elif timeline_files.is_edl(path) and rate in (30, 60) and edit.rate != rate:
+    elif timeline_files.is_edl(path) and rate in (30, 60) and timeline.rate != rate:
         notes.append(
             f"{path} drops frame numbers, which {rate} frames per second do not: "
-            f"{float(edit.rate):.4g} are assumed"
+            f"{float(timeline.rate):.4g} are assumed"
         )
     if renamed:
         notes.append(
@@ -161,5 +161,5 @@ def _of_edit(
             f"{'was' if len(renamed) == 1 else 'were'} renamed by the first frame: "
             f"{some_of(renamed)}"
         )
-    source = Source(file_safe(path.stem), str(path), timeline_files.sha256(path), edit.rate)
+    source = Source(file_safe(path.stem), str(path), timeline_files.sha256(path), timeline.rate)
     return source, named, notes

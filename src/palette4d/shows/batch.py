@@ -253,8 +253,8 @@ class Show:
             document = outcome.document
             document["clip"]["source"] = entry.shot.clip
             frames = document["clip"]["frames"]
-            if edit := _edit_of(entry.shot, (frames["first"], frames["last"])):
-                document["extra"]["edit"] = edit
+            if played := _played(entry.shot, (frames["first"], frames["last"])):
+                document["extra"]["edit"] = played
             target = self.folder / entry.sidecar
             _, notes = reanalysis.save(document, target, on_edits=self.options.on_edits)
             self.entries[name] = Entry(entry.shot, DONE, (frames["first"], frames["last"]))
@@ -277,29 +277,29 @@ class Show:
         return total - left, total, f"{ready} of {counted(len(self.entries), 'shot')}"
 
 
-def _edit_of(shot: Shot, frames: tuple[int, int]) -> dict[str, Any]:
-    """Return how an edit plays a shot, by the names of the node's parameters, and its CDL.
+def _played(shot: Shot, frames: tuple[int, int]) -> dict[str, Any]:
+    """Return how a timeline plays a shot, by the names of the node's parameters, and its CDL.
 
     `frames` are the sidecar's first and last. Nothing at the media's own speed and without a CDL.
     """
-    edit: dict[str, Any] = {}
+    played: dict[str, Any] = {}
     if shot.speed != 1:
         trimmed = frames[1] - shot.used[1] if shot.speed < 0 else shot.used[0] - frames[0]
-        edit = {"speed": abs(shot.speed), "reverse": shot.speed < 0, "inPoint": trimmed}
+        played = {"speed": abs(shot.speed), "reverse": shot.speed < 0, "inPoint": trimmed}
     if shot.cdl is not None:
-        edit["cdl"] = dataclasses.asdict(shot.cdl)
-    return edit
+        played["cdl"] = dataclasses.asdict(shot.cdl)
+    return played
 
 
 def _tell_edit(target: Path, shot: Shot, frames: tuple[int, int]) -> None:
-    """Let a sidecar that is kept say how the edit plays its shot now."""
+    """Let a sidecar that is kept say how the timeline plays its shot now."""
     read = sidecar.read_bytes(target)
     document = sidecar.decoded(read, str(target))[1]
-    edit = json.loads(json.dumps(_edit_of(shot, frames)))
-    if document["extra"].get("edit", {}) == edit or shot.place is None:
+    played = json.loads(json.dumps(_played(shot, frames)))
+    if document["extra"].get("edit", {}) == played or shot.place is None:
         return
-    document["extra"] = {**document["extra"], "edit": edit}
-    if not edit:
+    document["extra"] = {**document["extra"], "edit": played}
+    if not played:
         del document["extra"]["edit"]
     sidecar.save(document, target, on_edits="drop", replaces=read)
 

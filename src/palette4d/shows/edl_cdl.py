@@ -1,4 +1,4 @@
-"""CDLs of an edit: comments * ASC_SOP and * ASC_SAT in an EDL, metadata in a timeline."""
+"""CDLs of a timeline: comments * ASC_SOP and * ASC_SAT in an EDL, metadata in other files."""
 
 from __future__ import annotations
 

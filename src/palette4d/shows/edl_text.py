@@ -53,7 +53,7 @@ class EventLine:
 
     @property
     def frames(self) -> int:
-        """How many frames of the edit it has."""
+        """How many frames of the timeline it has."""
         return self.record[1] - self.record[0]
 
     @property

@@ -1,4 +1,4 @@
-"""Finds an edit's media: the file that a timeline names, or a file of that name in a folder.
+"""Finds a timeline's media: the file that it names, or a file of that name in a folder.
 
 A folder is listed once, with all its subfolders; only names count. The extension may differ (a
 proxy). For a sequence the timeline may name the first file or the pattern.

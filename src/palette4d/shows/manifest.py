@@ -67,7 +67,7 @@ class Manifest:
     source_sha256 : the hash of the timeline's file; "" for a movie.
     rate : frames per second of the timeline, or of the movie.
     options : the options of the analysis, as sidecars record them.
-    entries : in the order of the edit.
+    entries : in the order of the timeline.
     """
 
     source: str
@@ -78,7 +78,7 @@ class Manifest:
 
     @property
     def is_timeline(self) -> bool:
-        """Whether the shots come from an edit, not from a movie."""
+        """Whether the shots come from a timeline, not from a movie."""
         return bool(self.source_sha256)
 
 
@@ -172,9 +172,9 @@ _MEND = "; move it away and run `palette4d analyze` again, which keeps the sidec
 
 def _entry(row: dict[str, Any]) -> Entry:
     place = None
-    if edit := row.get("edit"):
-        path = tuple(map(_whole, edit["path"]))
-        place = Place(_text(edit["track"]), _text(edit["record"]), path)
+    if place_of := row.get("edit"):
+        path = tuple(map(_whole, place_of["path"]))
+        place = Place(_text(place_of["track"]), _text(place_of["record"]), path)
     first, last = map(_whole, row["asked"])
     used_first, used_last = map(_whole, row["used"])
     frames, step = row.get("frames"), _whole(row["step"])

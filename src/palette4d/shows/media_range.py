@@ -1,8 +1,8 @@
-"""The media that a clip of an edit shows, with transitions, speed and compounds.
+"""The media that a clip of a timeline shows, with transitions, speed and compounds.
 
-Input: a clip of an OpenTimelineIO timeline. Output: times of the edit and of the media, in seconds.
-OpenTimelineIO's times are doubles at any rate. Here they are fractions, so that no sum of times at
-several rates is off by a frame.
+Input: a clip of an OpenTimelineIO timeline. Output: times of the timeline and of the media, in
+seconds. OpenTimelineIO's times are doubles at any rate. Here they are fractions, so that no sum of
+times at several rates is off by a frame.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Level:
 
 @dataclasses.dataclass(frozen=True)
 class Shown:
-    """The range of a clip's media that an edit shows.
+    """The range of a clip's media that a timeline shows.
 
     Attributes
     ----------
@@ -96,9 +96,9 @@ def seconds(time: Any) -> Fraction:
 
 
 def shown(levels: Sequence[Level], rate: Fraction) -> Shown | None:
-    """Return the range of a clip's media that an edit shows; None if it shows none.
+    """Return the range of a clip's media that a timeline shows; None if it shows none.
 
-    `levels` begins with the clip and ends with the track. `rate` is the edit's.
+    `levels` begins with the clip and ends with the track. `rate` is the timeline's.
     """
     schema = library().schema
     clip = levels[0].item
@@ -192,7 +192,7 @@ def _with_speed(clip: Any, record: Fraction | None, left: _Range, rate: Fraction
     own = clip.trimmed_range()
     begin, end = _bounds(own)
     counted = own_rate(own)
-    # The edit shows no frame after its own last one.
+    # The timeline shows no frame after its own last one.
     finest = counted if nominal(counted) == nominal(rate) else max(counted, rate)
     step = 1 / finest
     first, last = left[0] - begin, max(left[0], left[1] - step) - begin

@@ -23,12 +23,12 @@ BINS = 4096
 
 @dataclasses.dataclass(frozen=True)
 class Place:
-    """The place of a shot in an edit.
+    """The place of a shot in a timeline.
 
     Attributes
     ----------
     track : the name of the video track.
-    record : its start in the edit: a timecode or a frame number.
+    record : its start in the timeline: a timecode or a frame number.
     path : the clip's place in the timeline: indices of children, from the timeline's stack down.
     """
 
@@ -47,12 +47,12 @@ class Shot:
     clip : the name for `open_clip`; "" if the media is missing.
     first, last : the first and last frame of the analysis, with head and tail frames; the clip's
         own numbers.
-    used : (int, int); the first and the last frame that the edit shows.
+    used : (int, int); the first and the last frame that the timeline shows.
     step : the distance between frames.
-    place : the place in the edit.
+    place : the place in the timeline.
     problem : the reason why it cannot be analysed, or "".
     speed : multiple of the media's own speed; negative backwards, 0 for a freeze frame.
-    cdl : the CDL that the edit states for it.
+    cdl : the CDL that the timeline states for it.
     """
 
     name: str
@@ -78,7 +78,7 @@ class Shot:
 
 
 def words_of_speed(speed: float) -> str:
-    """Return how an edit plays a shot.
+    """Return how a timeline plays a shot.
 
     >>> words_of_speed(-1), words_of_speed(1.5), words_of_speed(-2), words_of_speed(0)
     ('backwards', '1.5 x', '2 x backwards', 'freeze frame')
@@ -176,9 +176,9 @@ def cuts_of(clip: Clip, progress: Callable[[int, int], object] | None = None) ->
 
 
 def trimmed(shot: Shot, clip: Clip) -> Shot:
-    """Return a shot of an edit with its head and tail frames cut off at the media's cuts.
+    """Return a shot of a timeline with its head and tail frames cut off at the media's cuts.
 
-    `clip` is its media, over the shot's frames. A cut inside the frames that the edit shows is
+    `clip` is its media, over the shot's frames. A cut inside the frames that the timeline shows is
     refused.
     """
     starts = cuts_of(clip)

@@ -1,6 +1,6 @@
 """One CDL for each shot of a show: as a collection (.ccc), and in the comments of an EDL.
 
-A shot's CDL is the one of the exported frame nearest to the middle of the edit's range.
+A shot's CDL is the one of the exported frame nearest to the middle of the timeline's range.
 """
 
 from __future__ import annotations

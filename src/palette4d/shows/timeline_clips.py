@@ -1,7 +1,7 @@
-"""The clips of an edit as plain data. Input: a timeline file. Output: an `EditList`.
+"""The clips of a timeline as plain data. Input: a timeline file. Output: an `ClipList`.
 
 Each clip of each enabled video track counts, also nested clips, with the range of its media that
-the edit shows (`media_range`). Gaps and generators do not. OpenTimelineIO's objects stay in the
+the timeline shows (`media_range`). Gaps and generators do not. OpenTimelineIO's objects stay in the
 child process: a small file can crash the library, or take all time or memory.
 """
 
@@ -31,21 +31,21 @@ MOST_DIGITS = 20
 
 
 @dataclasses.dataclass(frozen=True)
-class EditClip:
-    """A clip of an edit.
+class TimelineClip:
+    """A clip of a timeline.
 
     Attributes
     ----------
     name : its name, may be "".
-    place : its place in the edit.
-    url : the file, or the folder of `pattern`, as the edit names it; "" if it names none.
+    place : its place in the timeline.
+    url : the file, or the folder of `pattern`, as the timeline names it; "" if it names none.
     pattern : the name of the image sequence that it refers to, with one # a digit, or "".
     reel : its reel's name, or "".
-    shown : the times of the media that the edit shows, and the speed.
-    rate : the media's frames per second, as the edit counts them.
-    begins, length : the start of the media in seconds, and its frames; None if the edit does not
-        say them.
-    by_frames : whether the edit's times are frames of the media, whatever its files' rate, as
+    shown : the times of the media that the timeline shows, and the speed.
+    rate : the media's frames per second, as the timeline counts them.
+    begins, length : the start of the media in seconds, and its frames; None if the timeline does
+        not say them.
+    by_frames : whether the timeline's times are frames of the media, whatever its files' rate, as
         in an EDL.
     drops : whether the timecodes of an EDL leave numbers out; None if nothing says so.
     cdl : its CDL.
@@ -70,16 +70,16 @@ class EditClip:
 
 
 @dataclasses.dataclass(frozen=True)
-class EditList:
+class ClipList:
     """A timeline's file, rate and clips in the order of the tracks, and notes on other items."""
 
     path: Path
     rate: Fraction
-    clips: tuple[EditClip, ...]
+    clips: tuple[TimelineClip, ...]
     notes: tuple[str, ...]
 
 
-def read(path: Path, rate: Fraction | None = None) -> EditList:
+def read(path: Path, rate: Fraction | None = None) -> ClipList:
     """Read an .otio, .otioz, .otiod or .edl file with exactly one timeline.
 
     `rate` is the rate of an EDL's timecodes, by default 24; other files state theirs.
@@ -87,7 +87,7 @@ def read(path: Path, rate: Fraction | None = None) -> EditList:
     return timeline_files.in_child(path, clips_of, path, rate)
 
 
-def clips_of(path: Path, rate: Fraction | None = None) -> EditList:
+def clips_of(path: Path, rate: Fraction | None = None) -> ClipList:
     """Return the clips of a timeline file, read in this process."""
     with timeline_files.faults_of(path):
         return _Walk(path, timeline_files.load(path, rate)).result()
@@ -98,7 +98,7 @@ class _Walk:
 
     def __init__(self, path: Path, timeline: Any) -> None:
         self.otio, self.timeline, self.path = timeline_files.library(), timeline, path
-        self.clips: list[EditClip] = []
+        self.clips: list[TimelineClip] = []
         self.others: dict[tuple[str, str], int] = {}
         start = timeline.global_start_time
         try:
@@ -106,7 +106,7 @@ class _Walk:
         except Palette4dError as error:
             raise Palette4dError(f"{path}: {error}") from None
 
-    def result(self) -> EditList:
+    def result(self) -> ClipList:
         """Return all clips; `Palette4dError` if there are none."""
         schema = self.otio.schema
         for index, track in enumerate(self.timeline.tracks):
@@ -131,7 +131,7 @@ class _Walk:
                 + ", ".join([counted(len(self.timeline.tracks), "track"), *notes])
                 + "; expected at least one clip with media on a video track"
             )
-        return EditList(self.path, self.rate, tuple(self.clips), notes)
+        return ClipList(self.path, self.rate, tuple(self.clips), notes)
 
     def passed_over(self, single: str, several: str) -> None:
         key = (single, several)
@@ -183,9 +183,9 @@ class _Walk:
             problem: str = in_words(error)
             if not isinstance(error, Palette4dError):
                 problem = f"its times or names cannot be used ({problem}); mend it in the edit"
-            self.clips.append(EditClip(clip.name, place, problem=problem))
+            self.clips.append(TimelineClip(clip.name, place, problem=problem))
 
-    def described(self, clip: Any, place: Place, shown: Shown) -> EditClip:
+    def described(self, clip: Any, place: Place, shown: Shown) -> TimelineClip:
         """Return a clip that shows a range of its media's time."""
         schema, reference = self.otio.schema, clip.media_reference
         numbered = isinstance(reference, schema.ImageSequenceReference)
@@ -206,7 +206,7 @@ class _Walk:
                 )
             url = reference.target_url_base or "."
             pattern = f"{reference.name_prefix}{'#' * digits}{reference.name_suffix}"
-        return EditClip(
+        return TimelineClip(
             name=clip.name,
             place=place,
             url=url,

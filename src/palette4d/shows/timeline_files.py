@@ -40,7 +40,7 @@ def library() -> Any:
 
 
 def is_timeline(spec: str) -> bool:
-    """Whether a file is an edit, by its extension."""
+    """Whether a file is a timeline, by its extension."""
     return Path(spec).suffix.lower().lstrip(".") in EXTENSIONS
 
 

@@ -1,7 +1,7 @@
-"""The shots of an edit. Input: the clips of a timeline. Output: `Shot`s.
+"""The shots of a timeline. Input: the clips of a timeline. Output: `Shot`s.
 
-Each clip gets the frames of its media that the edit shows, numbered as in `media.clip`: the numbers
-in the names of an image sequence, and numbers from 0 in a movie.
+Each clip gets the frames of its media that the timeline shows, numbered as in `media.clip`: the
+numbers in the names of an image sequence, and numbers from 0 in a movie.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from palette4d.media.timecode import (
 )
 from palette4d.shows import find_media
 from palette4d.shows.shots import Shot
-from palette4d.shows.timeline_clips import EditClip, EditList
+from palette4d.shows.timeline_clips import ClipList, TimelineClip
 
 #: Limits for opening one clip: a long movie's time stamps are read through a slow network.
 SECONDS, MEGABYTES = 300.0, 8192
@@ -45,7 +45,7 @@ class Media:
     """A clip's first and last frame, all of them in words, and whether it is a movie, or a still.
 
     `rate` is for movies: images rarely state theirs. An opened clip may hold a million
-    numbers, and an edit thousands of clips.
+    numbers, and a timeline thousands of clips.
     """
 
     first: int
@@ -65,22 +65,22 @@ Conform = Literal["by-rates", "frame-for-frame"]
 
 
 def shots_of(
-    edit: EditList,
+    timeline: ClipList,
     folder: find_media.Folder | None = None,
     handles: int = 0,
     conform: Conform | None = None,
 ) -> tuple[list[Shot], list[str]]:
-    """Return the shots of an edit, and notes on how they were counted.
+    """Return the shots of a timeline, and notes on how they were counted.
 
     `Shot.problem` says if the media is missing or unusable.
 
     Media is looked for in `folder`, then beside the timeline. `handles` is the number of head and
-    of tail frames; there are fewer where the media ends. `conform` says how the edit plays movies
-    of another rate; see `_Finder.counted`.
+    of tail frames; there are fewer where the media ends. `conform` says how the timeline plays
+    movies of another rate; see `_Finder.counted`.
     """
-    finder = _Finder(edit.path, folder, handles, conform)
-    with Child(SECONDS, MEGABYTES, finder.files(edit.clips)) as finder.child:
-        shots = [finder.shot(clip) for clip in edit.clips]
+    finder = _Finder(timeline.path, folder, handles, conform)
+    with Child(SECONDS, MEGABYTES, finder.files(timeline.clips)) as finder.child:
+        shots = [finder.shot(clip) for clip in timeline.clips]
         return shots, list(dict.fromkeys(finder.notes))
 
 
@@ -103,7 +103,7 @@ class _Finder:
         self.timecodes: dict[str, str | None] = {}
         self.notes: list[str] = []
 
-    def files(self, clips: Iterable[EditClip]) -> Iterator[Path]:
+    def files(self, clips: Iterable[TimelineClip]) -> Iterator[Path]:
         """Yield what must be read to open the media of clips."""
         for clip in clips:
             with contextlib.suppress(Palette4dError, OSError, ValueError):  # `shot` says so
@@ -111,7 +111,7 @@ class _Finder:
         for spec in dict.fromkeys(self.specs.values()):
             yield from files_of(spec)
 
-    def shot(self, clip: EditClip) -> Shot:
+    def shot(self, clip: TimelineClip) -> Shot:
         """Return the shot for a clip."""
         problem = clip.problem
         if not problem:
@@ -122,7 +122,7 @@ class _Finder:
         name = _name(clip.name or "shot")
         return Shot(name, "", 0, 0, (0, 0), place=clip.place, problem=problem)
 
-    def found_shot(self, clip: EditClip) -> Shot:
+    def found_shot(self, clip: TimelineClip) -> Shot:
         """Return the shot for a clip whose media is there."""
         spec = self.specs.get(id(clip)) or self.found(clip)
         media = self.opened(spec)
@@ -157,7 +157,7 @@ class _Finder:
             raise Palette4dError(media)
         return media
 
-    def found(self, clip: EditClip) -> str:
+    def found(self, clip: TimelineClip) -> str:
         """Find a clip's media: by name in the folder, else at the timeline's path."""
         names: list[str] = []
         named = ""
@@ -185,8 +185,8 @@ class _Finder:
             help_ = f"bring it there, or name another folder with {Arg('media')}"
         raise Palette4dError(f"the media is missing: {what}; {help_}")
 
-    def frames(self, clip: EditClip, spec: str, media: Media) -> tuple[int, int]:
-        """Return the first and last frame of the media that the edit shows, as the files count."""
+    def frames(self, clip: TimelineClip, spec: str, media: Media) -> tuple[int, int]:
+        """Return the first and last frame of the media that are shown, as the files count."""
         if media.is_still:
             return media.first, media.first
         rate = self.counted(clip, spec, media)
@@ -194,12 +194,12 @@ class _Finder:
         offset = self.offset(clip, spec, media, rate, (first, last))
         return first + offset, last + offset
 
-    def counted(self, clip: EditClip, spec: str, media: Media) -> Fraction:
-        """Return the rate at which a clip's frames count: the edit's, or the movie's own.
+    def counted(self, clip: TimelineClip, spec: str, media: Media) -> Fraction:
+        """Return the rate at which a clip's frames count: the timeline's, or the movie's own.
 
-        23.976 and 24 count alike. An edit that has another rate for all of the movie's frames plays
-        them frame for frame; else its times are seconds. Timecodes of an EDL count frames of the
-        movie, or pairs of them (SMPTE ST 12-1) and so on, which are seconds, too.
+        23.976 and 24 count alike. A timeline that has another rate for all of the movie's frames
+        plays them frame for frame; else its times are seconds. Timecodes of an EDL count frames of
+        the movie, or pairs of them (SMPTE ST 12-1) and so on, which are seconds, too.
         """
         if not media.is_movie or nominal(clip.rate) == nominal(media.rate):
             return clip.rate
@@ -220,7 +220,7 @@ class _Finder:
         return media.rate if by_rates else clip.rate
 
     def offset(
-        self, clip: EditClip, spec: str, media: Media, rate: Fraction, shown: tuple[int, int]
+        self, clip: TimelineClip, spec: str, media: Media, rate: Fraction, shown: tuple[int, int]
     ) -> int:
         """Return the offset from a frame of the media's time to the file's frame number."""
         begins = None if clip.begins is None else round(clip.begins * rate)
@@ -247,7 +247,9 @@ class _Finder:
             first = nearest(first, begins, day_of(rate, drops))
         return media.first - begins + first - shown[0]
 
-    def renumbered(self, clip: EditClip, spec: str, rate: Fraction, frame: int, drops: bool) -> int:
+    def renumbered(
+        self, clip: TimelineClip, spec: str, rate: Fraction, frame: int, drops: bool
+    ) -> int:
         """Count the timecode of an EDL's event as its media's timecodes count."""
         label = label_of(frame, rate, bool(clip.drops))
         found = frames_of(label.replace(";", ":"), rate, drops)
