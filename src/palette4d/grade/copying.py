@@ -260,9 +260,8 @@ def _pick(match: Match, pick: Pick) -> Pick | None:
         return as_colour((own if into is None else into(own)).tolist())
 
     def time(frame: float) -> int:
-        first, last, step = match.target.frames
-        nearest = first + step * round((match.back(frame) - first) / step)
-        return min(max(nearest, first), last)
+        first, _, step = match.target.frames
+        return first + step * round((match.back(frame) - first) / step)
 
     # Places, paths and mattes are the other clip's.
     copy = replace(pick, pixel=None, box=None, areas=(), path=(), matte=None)
