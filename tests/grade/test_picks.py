@@ -28,7 +28,14 @@ def test_a_darker_colour_changes_less() -> None:
     assert pick.change_at(10) == pytest.approx([0, 0.2, 0])
 
 
-def test_mattes_are_learned_from_frames_spread_over_the_clip() -> None:
+@pytest.mark.parametrize(("path", "frames"), [
+    ((), [0, 2, 6, 10]),
+    # Where less than half of the change is asked for, most of the thing is out of sight.
+    ((PathKey(0, GREY), PathKey(4, GREY), PathKey(5, GREY, there=0.4)), [0, 2, 4]),
+])  # fmt: skip
+def test_mattes_are_learned_from_frames_spread_over_the_clip(
+    path: tuple[PathKey, ...], frames: list[int]
+) -> None:
     picture = np.random.default_rng(0).random((8, 12, 3), np.float32)
     seen: list[int] = []
 
@@ -36,8 +43,9 @@ def test_mattes_are_learned_from_frames_spread_over_the_clip() -> None:
         seen.append(frame)
         return picture
 
-    mattes.learn(Pick("p1", "pick", 0, GREY, (0.6, 0.5, 0.5)), (), range(12), read, None)
-    assert seen == [0, 2, 6, 10]
+    pick = Pick("p1", "pick", 0, GREY, (0.6, 0.5, 0.5), path=path)
+    mattes.learn(pick, (), range(12), read, None)
+    assert seen == frames
 
 
 def test_a_pick_that_does_not_act_yet_is_not_told_to_be_off() -> None:

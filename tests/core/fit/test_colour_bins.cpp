@@ -1,3 +1,5 @@
+// Cells, samples and memory. tests/media/test_clip_fills.py compares the bins of every kind of file
+// with NumPy's.
 #include "fit/colour_bins.hpp"
 
 #include <algorithm>
@@ -49,27 +51,6 @@ bool rising(const std::vector<std::uint64_t>& keys) {
 
 }  // namespace
 
-TEST(eight_bit_colours_are_exact) {
-    shapes::Random random(1);
-    std::vector<std::uint8_t> samples;
-    std::map<Vec3, double> expected;
-    for (int i = 0; i < 20000; ++i) {
-        Vec3 colour{};
-        for (double& x : colour) {
-            samples.push_back(static_cast<std::uint8_t>(random.below(i % 2 ? 256 : 4)));
-            x = samples.back() / 255.0;
-        }
-        expected[colour] += 1;
-    }
-    ColourBinner binner;
-    binner.add(row_of(samples), false);
-    CHECK_EQUAL(binner.pixels(), 20000.0);
-    const ColourBins bins = binner.take(kAll);
-    CHECK(colours_of(bins) == expected);
-    CHECK_EQUAL(bins.rgb.size(), expected.size());
-    CHECK(rising(bins.keys));
-}
-
 TEST(a_frame_is_forgotten_when_it_is_taken) {
     ColourBinner binner;
     for (int round = 0; round < 3; ++round) {
@@ -83,27 +64,6 @@ TEST(a_frame_is_forgotten_when_it_is_taken) {
     }
     CHECK(binner.take(kAll).rgb.empty());
     CHECK(ColourBinner().take(1).rgb.empty());
-}
-
-TEST(strips_make_the_frame) {
-    shapes::Random random(2);
-    std::vector<std::uint8_t> codes(90 * 3);
-    std::vector<float> floats(90 * 3);
-    for (std::size_t i = 0; i < codes.size(); ++i) {
-        codes[i] = static_cast<std::uint8_t>(random.below(256));
-        floats[i] = static_cast<float>(random.uniform(-0.5, 1.5));
-    }
-    ColourBinner whole, strips;
-    whole.add(Rows<std::uint8_t>{codes.data(), 10, 9, 3, 30}, false);
-    // Upside down, in two strips.
-    strips.add(Rows<std::uint8_t>{codes.data() + 8 * 30, 10, 4, 3, -30}, false);
-    strips.add(Rows<std::uint8_t>{codes.data() + 4 * 30, 10, 5, 3, -30}, false);
-    CHECK(colours_of(whole.take(kAll)) == colours_of(strips.take(kAll)));
-    whole.add(Rows<float>{floats.data(), 10, 9, 3, 120}, false);
-    for (int y = 0; y < 9; ++y) strips.add(Rows<float>{floats.data() + 30 * y, 10, 1, 3, 0}, false);
-    const ColourBins a = whole.take(kAll), b = strips.take(kAll);
-    CHECK(a.rgb == b.rgb && a.counts == b.counts && a.keys == b.keys);
-    CHECK_EQUAL(sum(a.counts), 90.0);
 }
 
 TEST(a_cell_keeps_the_mean_of_its_pixels) {
@@ -159,15 +119,6 @@ TEST(cells_of_floats_are_those_of_a_plain_map) {
     }
 }
 
-TEST(integers_are_taken_over_their_largest_value) {
-    ColourBinner binner;
-    binner.add(row_of<std::uint16_t>({65535, 0, 32768}), 16, false);
-    CHECK(binner.take(1).rgb[0] == (Vec3{1, 0, static_cast<double>(32768.0f / 65535.0f)}));
-    binner.add(row_of<std::uint16_t>({1023 << 6, 0, (512 << 6) + 37}), 10, false);
-    CHECK(binner.take(1).rgb[0] == (Vec3{1, 0, static_cast<double>(512.0f / 1023.0f)}));
-    CHECK_THROWS(std::invalid_argument, binner.add(row_of<std::uint16_t>({0, 0, 0}), 17, false));
-}
-
 TEST(what_is_not_finite_or_does_not_show_is_ignored) {
     ColourBinner binner;
     binner.add(row_of<float>({kNan, 0, 0, 0.5f, 0.5f, 0.5f, 0, kInf, 0, 0, 0, -kInf}), false);
@@ -189,64 +140,6 @@ TEST(what_is_not_finite_or_does_not_show_is_ignored) {
     CHECK_EQUAL(bins.counts[0], 2.0);
     binner.add(row_of<float>({kNan, kNan, kNan}), false);
     CHECK(binner.take(1).rgb.empty());
-}
-
-TEST(premultiplied_colours_are_divided_by_alpha) {
-    ColourBinner binner;
-    binner.add(row_of<std::uint8_t>({10, 20, 51, 51, 3, 3, 3, 0}, 4), true);
-    CHECK_EQUAL(binner.transparent(), 1.0);
-    const Vec3 found = binner.take(1).rgb[0];
-    CHECK_NEAR(found[0], 10 / 51.0, 1e-7);
-    CHECK_NEAR(found[2], 1, 1e-7);
-    const float most = std::numeric_limits<float>::max();
-    binner.add(row_of<float>({most, 0, 0, 0.01f, 0.5f, 0.25f, 0, 0.5f}, 4), true);
-    CHECK_EQUAL(binner.ignored(), 1.0);  // more than a float holds
-    CHECK(binner.take(1).rgb[0] == (Vec3{1, 0.5, 0}));
-}
-
-TEST(luma_and_chroma_of_any_depth) {
-    // ITU-R BT.709, limited range: black, white, and the primary red from its definition.
-    const double kr = 0.2126, kb = 0.0722;
-    for (const int bits : {8, 10}) {
-        const double unit = 1 << (bits - 8);
-        const double y = kr, cb = -kr / (2 * (1 - kb)), cr = 0.5;
-        const auto code = [&](double value) {
-            return static_cast<std::uint16_t>(std::lround(value * unit));
-        };
-        const std::vector<std::uint16_t> luma{code(16), code(235), code(16 + 219 * y), code(5)};
-        const std::vector<std::uint16_t> blue{code(128), code(128), code(128 + 224 * cb),
-                                              code(128)};
-        const std::vector<std::uint16_t> red{code(128), code(128), code(128 + 224 * cr), code(128)};
-        ColourBinner binner;
-        if (bits == 10) {
-            const Rows<std::uint16_t> planes[3] = {row_of(luma, 1), row_of(blue, 1),
-                                                   row_of(red, 1)};
-            binner.add_luma_chroma(planes, {kr, kb, 10, false});
-        } else {
-            const std::vector<std::uint8_t> y8(luma.begin(), luma.end()),
-                b8(blue.begin(), blue.end()), r8(red.begin(), red.end());
-            const Rows<std::uint8_t> planes[3] = {row_of(y8, 1), row_of(b8, 1), row_of(r8, 1)};
-            binner.add_luma_chroma(planes, {kr, kb, 8, false});
-        }
-        CHECK_EQUAL(binner.pixels(), 4.0);
-        const auto colours = colours_of(binner.take(kAll));
-        CHECK_EQUAL(colours.size(), std::size_t{3});
-        CHECK_EQUAL(colours.at({0, 0, 0}), 2.0);  // blacker than black is clamped
-        CHECK_EQUAL(colours.at({1, 1, 1}), 1.0);
-        const Vec3 primary = colours.rbegin()->first == Vec3{1, 1, 1}
-                                 ? std::next(colours.rbegin())->first
-                                 : colours.rbegin()->first;
-        CHECK_NEAR(primary[0], 1, 0.01);
-        CHECK_NEAR(primary[1], 0, 0.01);
-        CHECK_NEAR(primary[2], 0, 0.01);
-    }
-    const std::vector<std::uint8_t> grey{0, 51, 255}, none{128, 128, 128};
-    const Rows<std::uint8_t> planes[3] = {row_of(grey, 1), row_of(none, 1), row_of(none, 1)};
-    ColourBinner binner;
-    binner.add_luma_chroma(planes, {kr, kb, 8, true});
-    const auto colours = colours_of(binner.take(kAll));
-    CHECK_EQUAL(colours.size(), std::size_t{3});
-    CHECK_NEAR(std::next(colours.begin())->first[1], 0.2, 1e-6);
 }
 
 TEST(a_sample_keeps_every_pixel_and_only_colours_of_the_frame) {
