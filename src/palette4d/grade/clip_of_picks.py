@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 F32 = NDArray[np.float32]
 Given = str | os.PathLike[str] | None
+#: Decimal places of a picked colour's code values: below a step of 16 bits.
 DIGITS = 6
 
 #: A frame whose colours differ by more than this from the analysed ones is of another clip: those

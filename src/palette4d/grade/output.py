@@ -27,7 +27,8 @@ LIGHTNESS_OF = {
     "ap1": "ACEScg",
     "rec601": "Rec.601",
 }
-LEAST_REACH, MOST_REACH = 1e-4, 100.0
+#: Limits of `Output.outside_at`, in code values.
+NEAREST, FARTHEST = 1e-4, 100.0
 #: The kinds of output that an id follows.
 _OF_ID = ("weight", "pick")
 
@@ -93,9 +94,9 @@ class Output:
             raise Palette4dError(
                 f"found a matte in {self.matte_in!r}, expected 'picture' or 'alpha'"
             )
-        if not LEAST_REACH <= self.outside_at <= MOST_REACH:
+        if not NEAREST <= self.outside_at <= FARTHEST:
             raise Palette4dError(
-                f"found outside at {self.outside_at}, expected {LEAST_REACH:g} to {MOST_REACH:g}"
+                f"found outside at {self.outside_at}, expected {NEAREST:g} to {FARTHEST:g}"
             )
 
     @property

@@ -37,11 +37,13 @@ from palette4d.media.colour_histogram import mean_shift
 
 F64 = NDArray[np.float64]
 
+# Least share of pixels that change at a cut, and as a multiple of the changes around it.
 LEAST_DIFFERENCE = 0.15
 LEAST_RATIO = 3.0
 LEAST_SHIFT = 0.01  # one step of 8 bits from black measures 0.009, others less
 # Around a flash the frames agree again: they differ by at most this share of the jump.
 AGREEMENT = 0.5
+# Frames of the longest flash, and the number of changes before and after that are compared.
 LONGEST_FLASH = 2
 AROUND = 5
 
