@@ -259,7 +259,10 @@ def test_ids_of_a_palette_that_was_found_anew_say_nothing(tmp_path: Path) -> Non
     assert any("the grade was copied" in note for note in new.notes)
 
 
-def test_the_grade_is_copied_if_a_handle_moves_in_time_beyond_a_stop(tmp_path: Path) -> None:
+@pytest.mark.parametrize("moves", [True, False])
+def test_the_grade_is_copied_beyond_a_stop_and_to_another_encoding(
+    tmp_path: Path, moves: bool
+) -> None:
     path = tmp_path / "clip.p4d.json"
     document = Document(members("edge_through_boundary"))
     document.stop("e2", frame=4, rgb=(1, 0, 0))
@@ -267,8 +270,12 @@ def test_the_grade_is_copied_if_a_handle_moves_in_time_beyond_a_stop(tmp_path: P
     moved = members("edge_through_boundary")
     moved["edits"] = {"vertices": [], "stops": []}
     moved["quality"] = {"stages": [], "options": {"method": "like"}, "versions": {}}
-    (middle,) = (v for v in moved["polytope"]["vertices"] if v["id"] == "v5")
-    middle["frame"] = 3
+    if moves:
+        (middle,) = (v for v in moved["polytope"]["vertices"] if v["id"] == "v5")
+        middle["frame"] = 3
+    else:
+        moved["polytope"]["vertices"][0]["rgb"] = [0.2, 0.1, 0.1]
+        moved["clip"]["encoding"] = "unknown"
     new = Document(moved)
     new.save(path, on_edits="keep")
     assert any("the grade was copied" in note for note in new.notes)
