@@ -91,6 +91,12 @@ def test_different_changes_of_one_thing_are_a_conflict(mine: State, theirs: Stat
         merged(state({"v1": RED}), mine, theirs, ())
 
 
+def test_a_note_goes_with_the_version_that_the_other_removed() -> None:
+    base: State = {("version", "warm"): state({"v1": RED}), **state({"v2": RED})}
+    mine: State = {**base, ("note", "warm"): "for the client"}
+    assert merged(base, mine, state({"v2": RED}), ()) == state({"v2": RED})
+
+
 def test_two_new_stops_of_one_id_are_two_stops() -> None:
     mine = {**state({"s1": stop(3), "s2": stop(4)}), ("lock", "s1"): True}
     theirs = state({"s1": stop(5)})
