@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import shutil
 import signal
 from collections.abc import Generator
 from pathlib import Path
@@ -22,8 +23,15 @@ from types import ModuleType
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from wine import WINE
 
 REPO_ROOT = Path(__file__).resolve().parent.parent
+
+
+if (
+    WINE
+):  # its Windows lacks what Python 3.13 copies files with; palette4d itself does not ask for it
+    del shutil._winapi.CopyFile2  # type: ignore[attr-defined]
 
 
 def shared_folder() -> Path:

@@ -13,4 +13,5 @@ pipes = pytest.mark.skipif(_WINDOWS, reason="Windows has no pipes in folders, an
 locks = pytest.mark.skipif(
     _WINDOWS, reason="Windows locks no temporary files: they count as left over after a day"
 )
+homes = pytest.mark.skipif(_WINDOWS, reason="Windows tells a user's folders by no variable")
 folders = pytest.mark.skipif(_WINDOWS, reason="Windows opens no folders as files")

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
-from posix_files import links
+from posix_files import homes, links
 
 import palette4d
 from palette4d.cli import main
 from palette4d.common.errors import Palette4dError
+from palette4d.common.text import quoted
 from palette4d.hosts import MARK, kdenlive, shotcut
 from palette4d.hosts.editors import data_folder, install_kdenlive, install_shotcut
 
@@ -20,7 +22,9 @@ FILTER = "Meltytech/Shotcut/extensions/filters/palette4d"
 
 def names(root: Path) -> list[str]:
     """Everything below a folder that is no folder, hidden names included."""
-    return sorted(str(path.relative_to(root)) for path in root.rglob("*") if not path.is_dir())
+    return sorted(
+        path.relative_to(root).as_posix() for path in root.rglob("*") if not path.is_dir()
+    )
 
 
 @pytest.fixture
@@ -153,6 +157,7 @@ def test_a_failed_write_leaves_the_earlier_version(
     assert (tmp_path / "palette4d.xml").read_bytes() == before
 
 
+@homes
 def test_the_verb_writes_both_to_the_users_own_folders(
     home: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -175,9 +180,11 @@ def test_the_verb_takes_folders_and_installs_the_node_beside_them(
     assert names(effects) == ["palette4d.xml"]
     assert (plugins / "Palette4D.ofx.bundle").is_dir()
     assert not home.exists()
-    assert f"OFX_PLUGIN_PATH={plugins}" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert re.search(rf"OFX_PLUGIN_PATH[= ]{re.escape(quoted(plugins))}\n", out)
 
 
+@homes
 def test_the_verb_says_what_is_in_the_way(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
     effect = home / EFFECT
     effect.parent.mkdir(parents=True)

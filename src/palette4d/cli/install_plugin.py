@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from palette4d.common.text import quoted
 from palette4d.hosts.bundle import SEARCH_PATH, default_destination, system_destination
 from palette4d.hosts.install import install_plugin
 
@@ -83,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
     if args.dest or not (args.kdenlive or args.shotcut):
         if args.dest:
             say = "setx OFX_PLUGIN_PATH " if sys.platform == "win32" else "export OFX_PLUGIN_PATH="
-            print(f"Tell your host where it is: {say}{args.dest.absolute()}")
+            print(f"Tell your host where it is: {say}{quoted(args.dest.absolute())}")
         print(
             "Restart the host (DaVinci Resolve, Nuke, Natron, Fusion, Kdenlive, …), add the node\n"
             "'Palette4D' (group Color) and choose a sidecar made by 'palette4d analyze'."

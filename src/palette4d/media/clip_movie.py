@@ -239,7 +239,8 @@ def open_movie(
         untagged, notes = _resolve_matrix(first, path, matrix)
         stated = stated_by(container, stream, first)
         own_rate = stream.average_rate or stream.guessed_rate or stream.base_rate
-        base = stream.time_base
+        # PyAV has rationals of its own since 19.
+        base = Fraction(stream.time_base) if stream.time_base else None
     if index.is_cut_short:
         notes.append(
             f"{path}: the file ends in the middle of its frames, and does not say how many are "

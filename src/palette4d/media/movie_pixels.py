@@ -39,17 +39,24 @@ def _newer(cls: type[Type], value: int) -> Type:
 Type._missing_ = classmethod(_newer)  # type: ignore[assignment] # mypy: no method is assigned
 
 
+def side_data(picture: av.VideoFrame) -> dict[Type, bytes]:
+    """Return what stands beside a picture, by its kind."""
+    every: Any = picture.side_data
+    # PyAV lists the kinds since 19, before it the data.
+    entries = [every[entry] if isinstance(entry, Type) else entry for entry in every]
+    return {entry.type: bytes(entry) for entry in entries}
+
+
 def turn(picture: av.VideoFrame) -> tuple[bool, bool, bool]:
     """Return how the display matrix turns a picture: (transposed, mirrored, upside down).
 
     Mirrored and upside down are about the picture after it is transposed. The matrix has the rows
     (a, b, u), (c, d, v), (x, y, w): the point (x, y) is shown at (ax + cy, bx + dy).
     """
-    every: Any = picture.side_data
-    stated = next((entry for entry in every if entry.type == Type.DISPLAYMATRIX), None)
+    stated = side_data(picture).get(Type.DISPLAYMATRIX)
     if stated is None:
         return False, False, False
-    a, b, _, c, d = np.frombuffer(bytes(stated), "=i4")[:5].tolist()
+    a, b, _, c, d = np.frombuffer(stated, "=i4")[:5].tolist()
     if abs(a) + abs(d) >= abs(b) + abs(c):
         return False, a < 0, d < 0
     return True, c < 0, b < 0

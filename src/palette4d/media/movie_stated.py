@@ -15,7 +15,7 @@ from av.sidedata.sidedata import Type
 
 from palette4d.media.colour_tags import ColourTags
 from palette4d.media.movie_boxes import boxes
-from palette4d.media.movie_pixels import FULL_RANGE, is_luma_chroma, turn
+from palette4d.media.movie_pixels import FULL_RANGE, is_luma_chroma, side_data, turn
 from palette4d.media.stated import Fields, Stated
 from palette4d.media.timecode import nominal
 
@@ -67,8 +67,7 @@ def stated_by(container: Any, stream: Any, picture: av.VideoFrame) -> Stated:
 
 def _hdr10(picture: av.VideoFrame) -> str:
     """Return the static metadata of HDR10 (SMPTE ST 2086, CTA-861.3) as x265 takes them."""
-    every: Any = picture.side_data
-    by_type = {entry.type: bytes(entry) for entry in every}
+    by_type = side_data(picture)
     texts = []
     if (display := by_type.get(Type.MASTERING_DISPLAY_METADATA)) is not None:
         # Ten fractions: x and y of red, green, blue and white, least and largest luminance.
@@ -92,7 +91,8 @@ def timecode_of(container: Any, rate: Fraction | None) -> str:
     match = _TIMECODE.search(_first(container, "timecode"))
     if match is None:
         return ""
-    text, base = match[0], nominal(rate) if rate else 0
+    # PyAV has rationals of its own since 19.
+    text, base = match[0], nominal(Fraction(rate)) if rate else 0
     counted = _counted_by_track(container.name.removeprefix("file:")) if base > 30 else 0
     if 0 < counted < base and base % counted == 0:
         return f"{text[:9]}{int(text[9:]) * (base // counted):02d}"
