@@ -14,6 +14,7 @@ import pytest
 from PySide6.QtCore import QObject
 from PySide6.QtNetwork import QLocalSocket
 
+from palette4d.cli.main import main
 from palette4d.common.errors import Palette4dError
 from palette4d.studio import app, instance
 from palette4d.studio.window import Window
@@ -41,6 +42,17 @@ def test_a_screenshot_of_what_cannot_be_opened_fails_and_a_frame_beyond_is_noted
     out = tmp_path / "window.png"
     assert app.run(str(sidecar), frame=999, screenshot=out, size=(900, 600)) == 0
     assert "no frame 999; its frames are 1 to 12" in capsys.readouterr().err
+    drawn = out.read_bytes()
+    assert main(["studio", str(sidecar), "--screenshot", str(out)]) == 1
+    assert "--force" in capsys.readouterr().err
+    assert out.read_bytes() == drawn
+    assert app.run(str(sidecar), screenshot=out, size=(800, 600), force=True) == 0
+    assert out.read_bytes() != drawn
+    frame = tmp_path / "clip" / "frame.0001.png"
+    source = frame.read_bytes()
+    with pytest.raises(Palette4dError, match="read for this output"):
+        app.run(str(sidecar), screenshot=frame, size=(900, 600), force=True)
+    assert frame.read_bytes() == source
     out.unlink()
     sidecar.write_text("{")
     with pytest.raises(Palette4dError, match=r"clip\.p4d\.json"):

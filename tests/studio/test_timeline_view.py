@@ -183,6 +183,15 @@ def test_keys_go_through_handles_and_rows(qtbot: Any, view: TimelineView) -> Non
     assert view.session.selection == ()
 
 
+def test_a_stop_at_the_end_of_a_row_is_refused_in_words(view: TimelineView) -> None:
+    first, *_ = view.session.frames
+    view.session.go(first)
+    view.session.select("v1")
+    view.add_stop_at_playhead()
+    assert view.session.status.level == "warning"
+    assert "v1" in view.session.status.text
+
+
 def test_nudge_and_reset_of_a_selected_stop(view: TimelineView) -> None:
     view.session.edit(lambda d: d.stop("e1", frame=4, rgb=(0.5, 0.5, 0.9)))
     document = view.session.document

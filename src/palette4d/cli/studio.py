@@ -38,6 +38,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     add("--clip", metavar="CLIP", help="the sidecar's clip (default: where the sidecar says)")
     add("--frame", metavar="T", type=number(), help="go to this frame")
     add("--screenshot", metavar="OUT.png", type=Path, help="draw the window into a file, and end")
+    add("--force", action="store_true", help="replace an existing screenshot")
     size = "the window's size in pixels (default: as it was left, 1600x1000 at first)"
     add("--size", metavar="WxH", type=_size, help=size)
     parser.set_defaults(run=run)
@@ -79,5 +80,6 @@ def run(args: argparse.Namespace) -> int:
         clip=args.clip,
         frame=args.frame,
         screenshot=args.screenshot,
+        force=args.force,
         size=args.size,
     )

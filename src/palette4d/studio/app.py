@@ -8,11 +8,12 @@ import socket
 import sys
 import time
 import traceback
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palette4d.common.errors import Palette4dError, WriteError
-from palette4d.common.files import replacing
+from palette4d.common.files import refuse_existing, replacing
 from palette4d.studio import libraries, texts
 
 if TYPE_CHECKING:
@@ -66,6 +67,7 @@ def run(
     clip: str | None = None,
     frame: float | None = None,
     screenshot: Path | None = None,
+    force: bool = False,
     size: tuple[int, int] | None = None,
     until_shown: bool = False,
     prepare: "Callable[[Window], object] | None" = None,
@@ -82,6 +84,8 @@ def run(
         The frame to go to.
     screenshot : Path, optional
         Draw the window into this file and return; needs no screen.
+    force : bool
+        Replace a file of that name.
     size : (int, int), optional
         The window's size in pixels; default: as it was left.
     until_shown : bool
@@ -90,6 +94,8 @@ def run(
         Called with the window before a screenshot, when everything is drawn: for the docs.
     """
     hidden = screenshot is not None or until_shown
+    if screenshot is not None:
+        _check(screenshot, force, path)
     if hidden:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
         # The platform without a screen warns that it has no window manager.
@@ -154,26 +160,26 @@ def run(
         if prepare is not None:
             prepare(window)
             wait_until_shown(app, window)
-        picture = window.grab()
+        picture, found = window.grab(), session.clip
         window.shut()
         settings.sync()  # while its folder is there
         if screenshot is not None:
-            save(picture, screenshot)
+            _save(picture, screenshot, force, () if found is None else map(found.file, found.frames))
         return 0
     return int(app.exec())
 
 
-def save(picture: "QPixmap", path: Path) -> None:
-    """Write a picture of the window; a file that is there is replaced.
+def _check(picture: Path, force: bool, *inputs: str | None) -> None:
+    """Refuse a name that no picture of the window may have."""
+    if picture.suffix.lower() not in (".png", ".jpg"):
+        raise Palette4dError(f"{picture}: found another extension, expected .png or .jpg")
+    refuse_existing(picture, force, inputs=(Path(each) for each in inputs if each is not None))
 
-    Raises
-    ------
-    Palette4dError
-        It cannot be written.
-    """
-    if path.suffix.lower() not in (".png", ".jpg"):
-        raise Palette4dError(f"{path}: found another extension, expected .png or .jpg")
-    with replacing(path, force=True) as temporary:
+
+def _save(picture: "QPixmap", path: Path, force: bool, inputs: Iterable[Path]) -> None:
+    """Write a picture of the window."""
+    refuse_existing(path, force, inputs=inputs)
+    with replacing(path, force=force) as temporary:
         if not picture.save(str(temporary)):
             raise WriteError(f"{path}: cannot be written; choose another folder")
 
