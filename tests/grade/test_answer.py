@@ -55,6 +55,17 @@ def test_one_thing_needs_no_help(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found.lines() == ["takes 10 % of frame 0"]
 
 
+def test_a_range_without_the_picks_frame_takes_as_much_of_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = RED
+    document = document_of(monkeypatch, picture, frames=4)
+    found = answer(document)
+    document.change_pick("p1", start=2, until=3)
+    assert again(document) == found
+
+
 def test_a_proposed_hold_keeps_the_other_thing(monkeypatch: pytest.MonkeyPatch) -> None:
     picture = np.tile(GREY, (H, W, 1))
     picture[30:90, 20:60] = RED

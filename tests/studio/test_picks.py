@@ -216,6 +216,30 @@ def test_the_tool_hold_holds_once_and_leaves_the_pick_selected(qtbot: Any, opene
     assert session.selection == ("p1",)
 
 
+def test_where_a_pick_is_in_another_frame_is_clicked(
+    qtbot: Any, opened: Window, settle: Settle, sidecar: Path
+) -> None:
+    pick(qtbot, opened, 40, 30)
+    session, panel = opened.session, opened.inspector.panel
+    session.save()
+    twin = Path(shutil.copy(sidecar, sidecar.with_name("twin.p4d.json")))
+    session.go(9)
+    settle(opened)
+    assert "frame 9" in panel.takes.words.text()
+    qtbot.mouseClick(panel.takes.button, LEFT)
+    QTest.mouseClick(opened.viewer, LEFT, pos=at(opened, 52, 34).toPoint())
+    assert session.selection == ("p1",)
+    qtbot.waitUntil(lambda: not session.following, timeout=20_000)
+    assert session.tool == ""
+    assert session.save()
+    words = ["pick", "--frame", "9", "--pixel", "52,34", "--with", "p1"]
+    assert main(["edit", str(twin), *words]) == 0
+    assert sidecar.read_bytes() == twin.read_bytes()
+    session.go(6)
+    settle(opened)
+    assert not panel.takes.button.isVisibleTo(panel)
+
+
 def answered(panel: PickPanel, found: Answer) -> None:
     """Show an answer, as if it had been found."""
     panel._resting.stop()

@@ -233,6 +233,19 @@ def test_a_sudden_cut_has_a_button_that_allows_it(
     qtbot.waitUntil(lambda: bool(window.banner.entries))
     (note,) = (each for each in window.banner.entries.values() if "sudden cut" in each.text)
     assert note.level == "warning"
+    assert not note.text.startswith(("note:", "warning:"))  # the banner says it
+
+
+def test_what_the_notes_of_an_analysis_advise_is_a_button_away(opened: Window, qtbot: Any) -> None:
+    dialog = opened.verbs.analyze_again()
+    dialog.notes, dialog.advised = "not convex", ["--set convexity=10"]
+    opened.verbs._open_result(dialog)
+    button = opened.banner.button(f"{texts.ANALYZE_AGAIN}…")
+    assert button is not None
+    button.click()
+    again = opened.verbs.dialogs[-1]
+    again.offers[0].click()
+    assert again.value("--set") == "convexity=10"
 
 
 def test_undo_brings_back_the_palette_before_an_analysis(

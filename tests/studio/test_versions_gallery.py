@@ -93,6 +93,28 @@ def test_two_versions_are_compared_until_something_is_edited(
     assert opened.viewer.picture.request.grade is not None
 
 
+def test_the_buttons_name_what_is_compared_and_escape_shows_the_source_again(
+    gallery: Gallery, opened: Window
+) -> None:
+    recolour(opened, (0.1, 0.9, 0.1))
+    choose(gallery, 0, 1)
+    gallery.compare()
+    buttons = opened.transport.compare
+    assert [buttons[side].text() for side in ("before", "after")] == ["A", "B"]
+    opened._do("cancel")
+    assert (opened.session.view.version, opened.session.view.after) == ("", "")
+    assert [buttons[side].text() for side in ("before", "after")] == ["Before", "After"]
+
+
+def test_a_version_that_was_kept_is_selected_so_that_its_note_can_be_typed(
+    gallery: Gallery, opened: Window
+) -> None:
+    recolour(opened, (0.1, 0.2, 0.8))
+    grade_steps.keep_version(opened.session)
+    assert gallery.chosen == [opened.session.versions[-1]]
+    assert gallery.note.isEnabled()
+
+
 def test_one_version_is_compared_with_the_grade(gallery: Gallery, opened: Window) -> None:
     choose(gallery, 0)
     gallery.buttons["compare"].click()

@@ -162,6 +162,30 @@ def test_a_click_before_its_frame_is_read_is_done_when_it_is(
     assert session.place is None
 
 
+def test_a_picture_of_another_frame_says_so_after_a_while(
+    opened: Window, settle: Settle, qtbot: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    viewer, session = opened.viewer, opened.session
+    assert session.player is not None
+    read, go_on = session.player.clip.load, threading.Event()
+
+    def waits(number: int) -> Any:
+        go_on.wait(20)
+        return read(number)
+
+    monkeypatch.setattr(session.player.clip, "load", waits)
+    session.player._frames.clear()
+    before = seen(opened)
+    session.go(11)
+    assert not viewer.late
+    qtbot.waitUntil(lambda: viewer.late)
+    assert viewer.shown_frame == 6
+    assert (seen(opened) != before).any()
+    go_on.set()
+    settle(opened)
+    assert not viewer.late
+
+
 def test_the_picture_of_a_drag_is_near_the_exact_one(
     opened: Window, settle: Settle, monkeypatch: pytest.MonkeyPatch
 ) -> None:

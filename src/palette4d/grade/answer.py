@@ -138,6 +138,9 @@ def answer_to(grade: Grade, pick: Pick, clip: ClipOfPicks) -> Answer | None:
     """Return the answer to a pick or hold; None where the clip is not there."""
     if clip.open() is None:
         return None
+    # A range may leave the frame of the pick out: what it takes is the same.
+    pick = replace(pick, start=None, until=None)
+    grade = grade.put("pick", pick.id, pick)
     view = _View.of(grade, clip, pick.frame)
     others = [other for other in grade.picks if other.enabled and other.id != pick.id]
     picks = [other for other in others if other.kind == "pick"]

@@ -164,7 +164,9 @@ def run(
         window.shut()
         settings.sync()  # while its folder is there
         if screenshot is not None:
-            _save(picture, screenshot, force, () if found is None else map(found.file, found.frames))
+            _save(
+                picture, screenshot, force, () if found is None else map(found.file, found.frames)
+            )
         return 0
     return int(app.exec())
 

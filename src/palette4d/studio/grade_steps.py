@@ -151,6 +151,19 @@ def hold(session: Session, place: Place) -> None:
     )
 
 
+def correct_path(session: Session, id_: str, place: Place) -> None:
+    """Say where a pick or hold is at another frame (`pick --with`)."""
+
+    def correct(document: Document, clip: OfClip | None, progress: Progress | None) -> None:
+        where: Any = {"pixel": (place.x, place.y), "box": place.box}
+        if clip is None:
+            where = {"colour": place.colour, "any_value": True}
+        document.correct_path(id_, place.frame, clip=clip, progress=progress, **where)
+
+    text = texts.CORRECTED.format(id=id_, frame=place.frame)
+    session.edit_later(correct, text, unread=Unread(place.colour))
+
+
 def add_area(session: Session, id_: str, area: Area) -> None:
     """Add a box or a stroke to a pick or hold (`area`)."""
 

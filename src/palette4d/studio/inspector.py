@@ -465,8 +465,13 @@ class Inspector(QWidget):
     def pick(self, place: Place) -> None:
         """Inspect a pixel of the clip; a new colour for it becomes a pick.
 
-        With the pipette, the selected colour becomes the pixel's colour.
+        With the pipette, the selected colour becomes the pixel's colour. With the tool "here", the
+        selected pick goes through the pixel.
         """
+        if self.session.tool == "here" and self.session.picked is not None:
+            self.session.take("")
+            grade_steps.correct_path(self.session, self.session.picked.id, place)
+            return
         if self.dropper.isChecked() and self.target is not None:
             self.dropper.setChecked(False)
             self.set_colour(np.asarray(place.colour))

@@ -18,8 +18,8 @@ from palette4d.common.text import quoted
 #: Python's options for a child: no module of the working folder, and UTF-8 on every system.
 PALETTE4D = ("-P", "-Xutf8", "-m", "palette4d")
 
-#: Seconds in which a cancelled child may clean up.
-GRACE = 3.0
+#: Seconds in which a cancelled child may clean up; on a busy machine it takes some.
+GRACE = 10.0
 
 #: Longest line of the child that is read as one, in bytes.
 LONGEST = 1 << 16
@@ -48,6 +48,8 @@ class Job:
         How much of it is done, 0..1; None if unknown.
     output, messages : str
         What it printed, and its notes and errors.
+    notes : list of str
+        The notes and warnings among these, without their kinds.
     advised : list of str
         The options that these name.
     status : int or None
@@ -59,6 +61,7 @@ class Job:
         self.what, self.fraction = "", None  # type: tuple[str, float | None]
         self.output = self.messages = ""
         self.advised: list[str] = []
+        self.notes: list[str] = []
         self.status: int | None = None
         self.cancelled = False
         self._changed = changed
@@ -121,7 +124,9 @@ class Job:
             for kind in {"note", "warning", "error"} & event.keys():
                 named = [part for part in event[kind] if not isinstance(part, str)]
                 self.advised += [str(part["option"]) for part in named]
-                self.messages += f"{kind}: {''.join(map(_said, event[kind]))}\n"
+                said = "".join(map(_said, event[kind]))
+                self.messages += f"{kind}: {said}\n"
+                self.notes += [said] if kind != "error" else []
         except (ValueError, TypeError, KeyError, OverflowError):
             self.messages += line.decode("utf-8", "replace")
         self._changed(self)

@@ -102,6 +102,9 @@ class MenuActions:
             self.session.take("")
         elif self.window.isFullScreen():
             self.window.showNormal()
+        elif self.session.view.version or self.session.view.after:
+            self.session.look(version="", after="")
+            self.session.say(texts.COMPARED_SOURCE)
         else:
             self.session.select()
 

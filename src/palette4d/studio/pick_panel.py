@@ -26,6 +26,7 @@ from palette4d.plotting import style
 from palette4d.studio import grade_steps, paint, texts, theme
 from palette4d.studio.colour_widgets import Bar, Span
 from palette4d.studio.newest import Newest
+from palette4d.studio.preview import taken_share
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
 from palette4d.studio.states import Place
@@ -89,6 +90,9 @@ class PickPanel(QWidget):
         self._waits: object = None  # what an answer was asked for
         self._known: object = None  # what the answer that is shown is for
         self._warned: tuple[str, ...] = ()
+        self._here: tuple[int, float] | None = None  # what it takes of the frame that is shown
+        self._lacks = False  # that frame was not read yet
+        self._revision = -1  # what the warnings are for
         self._resting = QTimer(self)
         self._resting.setSingleShot(True)
         self._resting.timeout.connect(self._ask)
@@ -98,6 +102,10 @@ class PickPanel(QWidget):
         column.addLayout(self._make_tools())
         column.addWidget(self._make_shape())
         self.takes, self.warning = Line(), Line()
+        self.takes.button.setText(texts.HERE_TOOL)
+        self.takes.button.setToolTip(texts.HERE_TOOL_TIP)
+        self.takes.button.setCheckable(True)
+        self.takes.button.clicked.connect(lambda on: session.take("here" if on else ""))
         self.notes = [Line() for _ in range(NOTES)]
         for k, line in enumerate(self.notes):
             line.button.clicked.connect(lambda _=False, k=k: self._do(k))
@@ -107,6 +115,9 @@ class PickPanel(QWidget):
         for event in ("document", "selection", "clip"):
             session.on(event, self.refresh, panel=True, follows=lambda: True)
             session.on(event, lambda: self._resting.start(REST))
+        session.on("frame", self._moved_on)
+        session.on("playing", self._moved_on)
+        session.on("pixels", lambda: self._moved_on() if self._lacks else None)
         session.on("answer", self._show_answer)
         session.on("view", self.refresh)
         session.on("tool", self._show_tool)
@@ -207,6 +218,7 @@ class PickPanel(QWidget):
     def _show_tool(self) -> None:
         self.add.setChecked(self.session.tool == "add")
         self.hold.setChecked(self.session.tool == "hold")
+        self.takes.button.setChecked(self.session.tool == "here")
         self.matte.setChecked(self.session.view.matte)
 
     # --------------------------------------------------------------------------------- what it does
@@ -250,6 +262,12 @@ class PickPanel(QWidget):
         """Whether the answer of now is shown."""
         return not self._resting.isActive() and self._waits is None
 
+    def _moved_on(self) -> None:
+        """Ask again at another frame; while playing, when that ends."""
+        if self.session.picked is not None and not self.session.playing:
+            self._lacks = False
+            self._resting.start(REST)
+
     def _ask(self) -> None:
         """Ask what the selected pick takes, and what speaks against it."""
         session, pick = self.session, self.session.picked
@@ -266,7 +284,11 @@ class PickPanel(QWidget):
         ]
         asked, trial = (document, source, own), Document(document.grade)
         known = session.answer if asked == self._known else None
-        self._waits = asked
+        same = known is not None and self._revision == session.revision
+        warned, self._revision, self._waits = self._warned, session.revision, asked
+        frame, player = session.frame, session.player
+        pixels = None if player is None else player.frame(frame)
+        self._lacks = pixels is None
         if known is None:
             for line in self.notes:
                 line.button.setEnabled(False)
@@ -274,27 +296,37 @@ class PickPanel(QWidget):
             self._clear(texts.LOOKING)
 
         def work() -> None:
-            found = known
+            found, here, told = known, None, warned
             try:
-                warned = trial.pick_warnings(pick.id, source)
+                if pixels is not None and pick.enabled:
+                    here = frame, taken_share(pixels, trial, pick.id, frame)
+                if not same:
+                    told = trial.pick_warnings(pick.id, source)
                 if found is None and pick.enabled:
                     found = trial.answer(pick.id, source)
             except Exception as error:  # whatever fails, the window stays
-                warned = (in_words(error),)
-            session.post(lambda: self._answered(asked, found, warned))
+                told = (in_words(error),)
+            session.post(lambda: self._answered(asked, found, here, told))
 
         self._newest.ask(work)
 
-    def _answered(self, asked: object, found: Answer | None, warned: tuple[str, ...]) -> None:
+    def _answered(
+        self,
+        asked: object,
+        found: Answer | None,
+        here: tuple[int, float] | None,
+        warned: tuple[str, ...],
+    ) -> None:
         if asked is not self._waits:
             return
-        self._waits, self._known, self._warned = None, asked, warned
+        self._waits, self._known, self._warned, self._here = None, asked, warned, here
         self.session.show_answer(found)
 
     def _clear(self, words: str = "") -> None:
         """Show no answer, but words instead of it."""
         for line in (*self.notes, self.warning):
             line.say("")
+        self.takes.button.hide()
         self.takes.say(words)
 
     def _show_answer(self) -> None:
@@ -303,7 +335,12 @@ class PickPanel(QWidget):
         told = [f"{_sentence(line)}." for line in self._warned]
         if found is not None and pick is not None:
             says = texts.TAKES if pick.kind == "pick" else texts.KEEPS
-            self.takes.say(says.format(share=percent(found.share), frame=found.frame))
+            words = says.format(share=percent(found.share), frame=found.frame)
+            frame, share = self._here or (found.frame, 0.0)
+            if frame == self.session.frame != found.frame:
+                words = f"{words} {texts.HERE.format(share=percent(share), frame=frame)}"
+                self.takes.button.setVisible(bool(pick.path))
+            self.takes.say(words)
             for line, note in zip(self.notes, found.notes, strict=False):
                 at = note.place
                 line.words.setStyleSheet(WARNS if note.warns else "")

@@ -39,6 +39,7 @@ class Preferences(QDialog):
         tabs = QTabWidget()
         tabs.addTab(self._make_general(), texts.GENERAL)
         tabs.addTab(self.keys, texts.SHORTCUTS)
+        tabs.currentChanged.connect(self.keys.table.search.setFocus)
         closes = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
         closes.rejected.connect(self.reject)
         layout = QVBoxLayout(self)

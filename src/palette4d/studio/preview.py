@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.common.errors import in_words
+from palette4d.grade.answer import TAKEN, WIDTH
 from palette4d.grade.document import Document
 from palette4d.grade.mattes import Display as Curve
 from palette4d.grade.palette import Palette
@@ -467,6 +468,17 @@ def matte_of(
     done = recolourer.apply(own, precision="single", threads=0)
     matte: F32 = np.clip(np.nan_to_num(done[..., 0] - own[..., 0]), 0, 1)
     return matte if picks is None or matte.any() else None
+
+
+def taken_share(pixels: F32, document: Document, id_: str, frame: int) -> float:
+    """Return the share of a frame that a pick or hold takes there: a quarter of its change or more.
+
+    Large pictures are looked at in every n-th pixel.
+    """
+    step = max(1, round(pixels.shape[1] / WIDTH))
+    picks = document.grade.core.pick_matte_at(id_, frame)
+    matte = matte_of(pixels[::step, ::step], Grade.of(document, frame), id_, picks)
+    return 0.0 if matte is None else float((matte > TAKEN).mean())
 
 
 def _highlighted(picture: U8, matte: F32) -> U8:

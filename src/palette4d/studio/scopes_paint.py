@@ -76,10 +76,14 @@ class ScopesPainter:
         Its font is used.
     zoom : float
         Of the vectorscope.
+    names : dict of str to str
+        What the sides "before" and "after" are called.
     """
 
-    def __init__(self, painter: QPainter, widget: QWidget, zoom: float) -> None:
-        self.painter, self.zoom = painter, zoom
+    def __init__(
+        self, painter: QPainter, widget: QWidget, zoom: float, names: dict[str, str]
+    ) -> None:
+        self.painter, self.zoom, self.names = painter, zoom, names
         self.font = paint.small_font(widget, -1.5)
         painter.setFont(self.font)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -148,8 +152,8 @@ class ScopesPainter:
         if count > 1:
             self.painter.setPen(QColor(theme.TEXT))
             flags = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop
-            names = {"before": texts.BEFORE, "after": texts.AFTER}
-            self.painter.drawText(box.adjusted(4, -HEAD - 1, -2, 0), flags, names[side])
+            room = box.adjusted(4, -HEAD - 1, -2, 0)
+            self.painter.drawText(room, flags, self.names[side])
 
     # ---------------------------------------------------------------------------- the histogram
 

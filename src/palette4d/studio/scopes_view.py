@@ -275,7 +275,12 @@ class _Canvas(QWidget):
             painter.setPen(QColor(theme.FAINT))
             painter.drawText(self.rect(), 0x84, words)  # centred
             return
-        own = ScopesPainter(painter, self, panel.zoom)
+        view = panel.session.view
+        names_of_sides = {
+            "before": view.version or texts.BEFORE,
+            "after": view.after or texts.AFTER,
+        }
+        own = ScopesPainter(painter, self, panel.zoom, names_of_sides)
         both = len(panel.sides)
         shapes = [
             1.0 * both if name == "vectorscope" else WIDE * (both if name == "parade" else 1)

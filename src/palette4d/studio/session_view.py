@@ -10,7 +10,7 @@ from palette4d.studio.display import Look
 from palette4d.studio.session_events import Events
 from palette4d.studio.states import Place, Probe, View
 
-Tool = Literal["", "add", "hold"]
+Tool = Literal["", "add", "hold", "here"]
 
 
 class SessionView(Events, ABC):
@@ -31,7 +31,8 @@ class SessionView(Events, ABC):
     place : Place or None
         The pixel or box that was clicked, and is not picked yet.
     tool : str
-        What a drag in the picture does: "" picks, "add" adds to the selected pick, "hold" holds.
+        What a drag in the picture does: "" picks, "add" adds to the selected pick, "hold" holds,
+        "here" says where the selected pick is in this frame.
     answer : Answer or None
         What the selected pick takes of its frame; None until that is known.
     view : View

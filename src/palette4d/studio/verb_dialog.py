@@ -98,7 +98,9 @@ class VerbDialog(QDialog):
     Attributes
     ----------
     notes : str
-        The notes and warnings of the verb.
+        The notes and warnings of the verb, a line each.
+    advised : list of str
+        The options that these name.
     """
 
     started = Signal()
@@ -119,7 +121,7 @@ class VerbDialog(QDialog):
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.verb, self.fields = verb, tuple(sorted(fields, key=lambda field: field.more))
         self.job: Job | None = None
-        self.notes = ""
+        self.notes, self.advised = "", list[str]()
         self._post, self._done = post, done
         self.inputs: list[Entry] = []
         column = QVBoxLayout(self)
@@ -311,17 +313,17 @@ class VerbDialog(QDialog):
                 self.stage.setText(texts.DONE if job.status == 0 else texts.FAILED)
             self.go.setEnabled(True)
             if not job.cancelled:
-                self._offer(job.advised)
+                self.offer(job.advised)
             self.stop.setText(texts.CLOSE)
             for entry in self.inputs:
                 entry.setEnabled(True)
         except RuntimeError:  # the dialog was closed
             return
-        self.job, self.notes = None, job.messages.strip()
+        self.job, self.notes, self.advised = None, "\n".join(job.notes), job.advised
         if job.status == 0 and self._done is not None:
             self._done(self)
 
-    def _offer(self, advised: Sequence[str]) -> None:
+    def offer(self, advised: Sequence[str]) -> None:
         """Show a button for each option that the messages advise, if it has a field here."""
         for option in dict.fromkeys(advised):
             flag, _, value = option.partition(" ")

@@ -221,12 +221,17 @@ class VerbMenu:
             self.session.go(frame)
             self.former.written(out)
         if notes:
-            self.window.banner.tell("notes", notes, "warning", {})
+            options, helps = dialog.advised, bool(dialog.advised) and not out.is_dir()
+            again = {f"{texts.ANALYZE_AGAIN}…": lambda: self.analyze_again().offer(options)}
+            self.window.banner.tell("notes", notes, "warning", again if helps else {})
         dialog.close()
 
     def render(self) -> VerbDialog:
         """Write the recoloured clip."""
-        marks = self.session.marks
+        marks, clip = self.session.marks, self.session.clip
+        own = self.session.frames[:2]
+        if marks is None and clip is not None and own != (clip.frames[0], clip.frames[-1]):
+            marks = own  # the palette is for these alone
         compared = ("", "wipe", "side")
         bits = ("", "8", "10", "16", "32")
         return self._from_sidecar(

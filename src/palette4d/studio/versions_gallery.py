@@ -120,7 +120,13 @@ class Gallery(QWidget):
         self._silent = True
         focus = self.list.currentItem()
         current = focus.data(NAME) if focus is not None else None
-        if names != tuple(self.list.item(k).data(NAME) for k in range(self.list.count())):
+        shown = tuple(self.list.item(k).data(NAME) for k in range(self.list.count()))
+        if names != shown:
+            new = [name for name in names if name not in shown]
+            if shown and len(new) == 1 and len(names) > len(shown):
+                chosen = new  # its note can be typed
+            elif len(names) == 1:
+                chosen = list(names)
             self.list.clear()
             for name in names:
                 item = QListWidgetItem(name)

@@ -38,6 +38,8 @@ BRUSH, LEAST_BRUSH, MOST_BRUSH, BRUSH_STEP = 10.0, 2.0, 200.0, 1.2
 PROBE_HEIGHT = 200
 #: Frames that are read around the playhead, when it has rested for so many milliseconds.
 AHEAD, BEHIND, REST = 6, 2, 80
+#: Milliseconds after which the picture of another frame says so.
+PATIENCE = 250
 
 F32 = NDArray[np.float32]
 
@@ -74,6 +76,9 @@ class Viewer(QWidget):
         #: a click or a box before its frame is read: the frame, two pixels, and whether it holds
         self._clicked: tuple[int, tuple[int, int], tuple[int, int], bool] | None = None
         self._lacks = False  #: the frame's pixels were wanted, and not there
+        self._patience = QTimer(self)  #: while it runs, the picture of another frame may stay
+        self._patience.setSingleShot(True)
+        self._patience.timeout.connect(self.update)
         self._resting = QTimer(self)
         self._resting.setSingleShot(True)
         self._resting.timeout.connect(self._read_around)
@@ -113,6 +118,12 @@ class Viewer(QWidget):
             and picture.request.revision == session.revision
         )
 
+    @property
+    def late(self) -> bool:
+        """Whether the picture has been that of another frame for some time."""
+        there = self.session.playing or self.shown_frame == self.session.frame
+        return not there and not self._patience.isActive()
+
     def _clip_changed(self) -> None:
         self.picture, self.images, self.shown_frame, self.problem = None, {}, None, ""
         self.zoom, self._clicked = None, None
@@ -129,6 +140,8 @@ class Viewer(QWidget):
         if not session.playing:
             # Its neighbours are read when the playhead rests.
             self._resting.stop()
+            if not self._patience.isActive():
+                self._patience.start(PATIENCE)
             session.player.want([session.frame])
             self.refresh()
         self._probe_again()

@@ -83,6 +83,9 @@ class ViewerPainter:
             _ring(painter, lambda: painter.drawRect(frame))
         self._draw_probe(painter)
         self._draw_legend(painter)
+        if self.viewer.late:
+            text = texts.LATE.format(shown=self.viewer.shown_frame, frame=self.session.frame)
+            _label(painter, text, QRectF(self.viewer.rect()), Qt.AlignmentFlag.AlignHCenter)
 
     def _covered(self) -> QRegion:
         """Return what pictures cover."""
@@ -159,7 +162,8 @@ class ViewerPainter:
         """Draw the picks (rings) and holds (squares) of this frame, with their colours."""
         session = self.session
         place = session.place
-        if place is not None and place.frame == session.frame:
+        # While its colour is dragged, it is one of the picks.
+        if place is not None and place.frame == session.frame and not session.dragging:
             box = self._mark(painter, place.x, place.y, place.box, hold=False, cross=True)
             inspected = np.array([place.colour, place.colour])
             _flag(painter, box, texts.NEW_PICK, on_screen(session, inspected), bright=True)
@@ -427,14 +431,18 @@ def _flag(
 
 
 def _label(painter: QPainter, text: str, box: QRectF, side: Qt.AlignmentFlag) -> None:
-    """Draw a caption in an upper corner of the picture."""
+    """Draw a caption at the upper rim of a box."""
     font = painter.font()
     font.setPointSizeF(9)
     font.setBold(False)
     painter.setFont(font)
     measure = QFontMetricsF(font)
     width = measure.horizontalAdvance(text) + 14
-    left = box.left() + 8 if side == Qt.AlignmentFlag.AlignLeft else box.right() - 8 - width
+    left = {
+        Qt.AlignmentFlag.AlignLeft: box.left() + 8,
+        Qt.AlignmentFlag.AlignHCenter: box.center().x() - width / 2,
+        Qt.AlignmentFlag.AlignRight: box.right() - 8 - width,
+    }[side]
     frame = QRectF(left, box.top() + 8, width, measure.height() + 6)
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(QBrush(QColor(18, 18, 18, 190)))
