@@ -41,7 +41,7 @@ def main(sidecar: str, seed: int) -> None:
     released = 0
 
     def look() -> None:
-        if released and texts.SAVED in window.file_facts.text().split("  ·  "):
+        if released and texts.SAVED in window.line.file_facts.text().split("  ·  "):
             say("saved", released)
 
     timer = QTimer()

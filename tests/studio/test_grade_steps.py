@@ -19,6 +19,7 @@ from palette4d.grade.picks import Pick
 from palette4d.studio import texts
 from palette4d.studio.inspector import Scope
 from palette4d.studio.session import Session
+from palette4d.studio.timeline_menu import menu_for
 from palette4d.studio.window import Window
 
 LEFT = Qt.MouseButton.LeftButton
@@ -100,7 +101,7 @@ class Hand:
     def choose(self, at: QPointF, *path: str) -> None:
         """Choose an entry of the timeline's menu at a point."""
         timeline = self.window.timeline
-        menu: QMenu = timeline.menu_for(timeline.places.hit(at), at.x())
+        menu: QMenu = menu_for(timeline, timeline.places.hit(at), at.x())
         for name in path[:-1]:
             menu = next(m for m in menu.findChildren(QMenu) if m.title() == name)
         next(entry for entry in menu.actions() if entry.text() == path[-1]).trigger()

@@ -31,6 +31,7 @@ from palette4d.studio import grade_steps, states, texts, theme
 from palette4d.studio.pick_panel import PickPanel
 from palette4d.studio.pixels import place_between
 from palette4d.studio.session import Session
+from palette4d.studio.timeline_menu import menu_for
 from palette4d.studio.window import Window
 
 LATER = 1e9
@@ -599,7 +600,7 @@ def test_the_menu_of_a_range_changes_the_pick(qtbot: Any, opened: Window) -> Non
     place = QPointF(timeline.places.x_of(6.5), timeline.places.lane_y(0))
 
     def choose(text: str) -> None:
-        menu = timeline.menu_for(timeline.places.hit(place), place.x())
+        menu = menu_for(timeline, timeline.places.hit(place), place.x())
         entries = [*menu.actions()]
         entries += [e for a in menu.actions() if a.menu() is not None for e in a.menu().actions()]
         next(entry for entry in entries if text in entry.text()).trigger()

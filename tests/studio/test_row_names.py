@@ -11,9 +11,9 @@ def test_all_edges_of_a_row_have_the_name_of_its_first_disc(opened: Window) -> N
     assert document is not None
     grade = document.grade
     track = max(grade.tracks, key=lambda track: len(track.edges))
-    names = {row_name(grade, edge) for edge in track.edges}
+    names = {row_name(document, edge) for edge in track.edges}
     assert names == {f"{track.name} {grade.colour_names[track.name]}"}
-    assert {row_name(grade, track.name)} == names
+    assert {row_name(document, track.name)} == names
 
 
 def test_the_history_and_the_inspector_tell_rows_by_name(opened: Window) -> None:
@@ -21,7 +21,7 @@ def test_the_history_and_the_inspector_tell_rows_by_name(opened: Window) -> None
     assert session.document is not None
     grade = session.document.grade
     edge = next(id_ for id_ in grade.palette(6).ids if id_ in grade.handles.edges)
-    name = row_name(grade, edge)
+    name = row_name(session.document, edge)
     session.edit(lambda document: document.stop(edge, frame=6, rgb=(0.1, 0.2, 0.9)))
     assert edge in session.document.history.done[-1].label
     shown = opened.history.list.item(1).text()
@@ -29,4 +29,4 @@ def test_the_history_and_the_inspector_tell_rows_by_name(opened: Window) -> None
     assert edge not in shown.split()
     session.select(edge)
     assert opened.inspector.title.text() == name
-    assert with_row_names(grade, f"{edge} is #{edge}") == f"{name} is #{edge}"
+    assert with_row_names(session.document, f"{edge} is #{edge}") == f"{name} is #{edge}"

@@ -22,6 +22,7 @@ from palette4d.plotting.layout import BAND
 from palette4d.studio import grade_steps, theme, timeline_places
 from palette4d.studio.session import Session
 from palette4d.studio.states import Probe
+from palette4d.studio.timeline_menu import menu_for
 from palette4d.studio.timeline_view import TimelineView
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
@@ -273,7 +274,7 @@ def test_the_menu_of_a_stop_sets_its_ramp_and_locks_it(view: TimelineView) -> No
     assert document is not None
     stop = next(i for i, s in document.grade.settings.items() if s.edge == "e1" and s.frame == 4)
     at = QPointF(place(view, stop))
-    menu = view.menu_for(view.places.hit(at), at.x())
+    menu = menu_for(view, view.places.hit(at), at.x())
     ramps = next(a.menu() for a in menu.actions() if a.menu() is not None)
     next(a for a in ramps.actions() if a.text() == "step").trigger()
     assert view.session.document.grade.settings[stop].ramp == "hold"

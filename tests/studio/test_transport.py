@@ -13,8 +13,10 @@ from palette4d.studio.window import Window
 def test_the_window_fits_a_screen_of_1920_pixels_at_200_percent(window: Window) -> None:
     bar = window.transport
     window.docks["shots"].show()
-    window.file_facts.setText("a_long_name_of_a_shot_of_a_show_v017.p4d.json  ·  not saved yet")
-    window.view_facts.setText("unknown encoding: code values as they are")
+    window.line.file_facts.setText(
+        "a_long_name_of_a_shot_of_a_show_v017.p4d.json  ·  not saved yet"
+    )
+    window.line.view_facts.setText("unknown encoding: code values as they are")
     window.resize(940, 490)
     window.arrange()
     assert (window.width(), window.height()) == (940, 490)

@@ -48,10 +48,10 @@ def test_names_that_look_like_html_are_shown_as_they_are(opened: Window, settle:
     opened.session.say(name, "error")
     settle(opened)
     tip = QTextDocument()
-    tip.setHtml(opened.says.toolTip())
+    tip.setHtml(opened.line.says.toolTip())
     assert tip.toPlainText() == name
-    assert opened.says.textFormat() == Qt.TextFormat.PlainText
-    assert opened.file_facts.textFormat() == Qt.TextFormat.PlainText
+    assert opened.line.says.textFormat() == Qt.TextFormat.PlainText
+    assert opened.line.file_facts.textFormat() == Qt.TextFormat.PlainText
 
 
 def test_undo_redo_and_the_history_by_hand(opened: Window) -> None:

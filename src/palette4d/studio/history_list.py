@@ -45,7 +45,7 @@ class History(QWidget):
             steps = (*document.history.done, *reversed(document.history.undone))
             rows = [(texts.BEGINNING, None)]
             for step in steps:
-                text = with_row_names(document.grade, step.label)
+                text = with_row_names(document, step.label)
                 rows.append((f"{text}  {texts.UNREAD_STEP}" if step.unread else text, step))
             done = len(document.history.done)
         self.list.clear()

@@ -301,7 +301,7 @@ class Inspector(QWidget):
         if document is not None:
             called = document.grade.colour_names.get(target.id) or document.grade.called(target.id)
             if target.kind == "edge":
-                name = row_name(document.grade, target.id)
+                name = row_name(document, target.id)
         if target.place is not None:
             name = texts.PLACE.format(x=target.place.x, y=target.place.y)
         self.title.setText(f"{name}{more}")

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QIcon, QImage, QPixmap
+from PySide6.QtGui import QIcon, QPixmap
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QVBoxLayout, QWidget
 
 from palette4d.common.errors import Palette4dError
@@ -17,6 +17,7 @@ from palette4d.media.source_clip import find_clip, nearest_frame
 from palette4d.shows import manifest
 from palette4d.studio import texts, theme
 from palette4d.studio.display import Display, Look
+from palette4d.studio.paint import image_of
 from palette4d.studio.player import Region, resampled
 from palette4d.studio.session import Session
 
@@ -142,9 +143,7 @@ class Shots(QWidget):
 
 def icon_of(pixels: U8) -> QIcon:
     """Return pixels, (h, w, 4) uint8, as an icon."""
-    height, width = pixels.shape[:2]
-    image = QImage(pixels.data, width, height, 4 * width, QImage.Format.Format_RGBX8888)
-    return QIcon(QPixmap.fromImage(image))
+    return QIcon(QPixmap.fromImage(image_of(pixels)))
 
 
 def thumbnail(sidecar: Path) -> U8 | None:

@@ -2,48 +2,28 @@
 
 import functools
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QMenu, QWidget
+from PySide6.QtWidgets import QMenu
 
 from palette4d.grade.edits import RAMPS
 from palette4d.grade.picks import Pick
 from palette4d.plotting import style
 from palette4d.studio import grade_steps, texts
+from palette4d.studio.menu_entries import VIEW
 from palette4d.studio.session import Session
-from palette4d.studio.timeline_places import Hit, Places
+from palette4d.studio.timeline_places import Hit
+
+if TYPE_CHECKING:
+    from palette4d.studio.timeline_view import TimelineView
 
 #: Fades of picks in the menu, in frames.
 FADES = (0.0, 2.0, 5.0, 10.0, 25.0)
 
 
-def menu_for(
-    view: QWidget,
-    session: Session,
-    places: Places,
-    hit: Hit,
-    *,
-    add_stop: Callable[[], object],
-    frame: float,
-    views: list[QAction],
-) -> QMenu:
-    """Return the menu of something under the pointer, which gets selected.
-
-    Parameters
-    ----------
-    view, session, places
-        The timeline.
-    hit : Hit
-        What is under the pointer.
-    add_stop : callable
-        Adds a stop to the row there.
-    frame : float
-        The frame under the pointer.
-    views : list of QAction
-        Entries for every menu.
-    """
-    menu = QMenu(view)
+def menu_for(view: "TimelineView", hit: Hit, x: float) -> QMenu:
+    """Return the menu of something under the pointer, at x; it gets selected."""
+    session, places, menu = view.session, view.places, QMenu(view)
     if hit.id and hit.id not in session.selection:
         session.select(hit.id)
     disc = places.disc(hit.id) if hit.what == "disc" else None
@@ -62,9 +42,11 @@ def menu_for(
         menu.addAction(texts.REMOVE, lambda: grade_steps.remove(session, list(session.selection)))
         menu.addSeparator()
     elif hit.what == "band":
-        menu.addAction(texts.ADD_STOP_AT.format(frame=style.number(frame)), add_stop)
+        frame = places.frame_at(x)
+        text = texts.ADD_STOP_AT.format(frame=style.number(frame))
+        menu.addAction(text, lambda: view.add_stop(hit.id, frame))
         menu.addSeparator()
-    menu.addActions(views)
+    menu.addActions(view.menu_actions[VIEW])
     return menu
 
 

@@ -18,12 +18,12 @@ from PySide6.QtGui import (
     QResizeEvent,
     QWheelEvent,
 )
-from PySide6.QtWidgets import QMenu, QToolTip, QWidget
+from PySide6.QtWidgets import QToolTip, QWidget
 
 from palette4d.plotting import style
 from palette4d.studio import grade_steps, texts, theme
 from palette4d.studio.frame_strip import FrameStrip
-from palette4d.studio.menu_entries import TIMELINE_ACTIONS, VIEW
+from palette4d.studio.menu_entries import TIMELINE_ACTIONS
 from palette4d.studio.panel_menus import view_actions
 from palette4d.studio.row_names import row_name
 from palette4d.studio.session import Session
@@ -405,7 +405,7 @@ class TimelineView(QWidget):
             line = f"{kind} {disc.id}: {self._called(disc.id)}\n{before}"
             return line if before == after else f"{line} → {after}"
         if hit.what == "band":
-            return f"{self._row(hit.id)}: {self._called(hit.id)}\n{texts.ROW_TIP}"
+            return f"{row_name(self.session.document, hit.id)}: {self._called(hit.id)}\n{texts.ROW_TIP}"
         for pick, _ in self.places.lanes() if hit.what == "pick" else ():
             if pick.id == hit.id:
                 return f"{pick.id}: {grade_steps.pick_tip(self.session, pick)}"
@@ -415,30 +415,13 @@ class TimelineView(QWidget):
         document = self.session.document
         return "" if document is None else document.grade.called(id_)
 
-    def _row(self, id_: str) -> str:
-        document = self.session.document
-        return id_ if document is None else row_name(document.grade, id_)
-
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         """Show the menu of what is under the pointer."""
         at = QPointF(event.pos())
         if event.reason() == QContextMenuEvent.Reason.Keyboard and self.session.selection:
             at = self.places.point_of(self.session.selection[0]) or at
-        self.menu_for(self.places.hit(at), at.x()).exec(self.mapToGlobal(at.toPoint()))
+        menu_for(self, self.places.hit(at), at.x()).exec(self.mapToGlobal(at.toPoint()))
         self._press = None
-
-    def menu_for(self, hit: Hit, x: float) -> QMenu:
-        """Return the menu of something under the pointer."""
-        frame = self.places.frame_at(x)
-        return menu_for(
-            self,
-            self.session,
-            self.places,
-            hit,
-            add_stop=lambda: self.add_stop(hit.id, frame),
-            frame=frame,
-            views=self.menu_actions[VIEW],
-        )
 
     # --------------------------------------------------------------------------------------- stops
 
@@ -450,10 +433,14 @@ class TimelineView(QWidget):
         index = content.edge_ids.index(edge)
         start, end = content.frames[list(content.edges[index])]
         if not start < frame < end:
-            self.session.say(texts.NO_STOP_HERE.format(row=self._row(edge)), "warning")
+            self.session.say(
+                texts.NO_STOP_HERE.format(row=row_name(self.session.document, edge)), "warning"
+            )
             return
         rgb = content.colours(index, np.array([frame]), edited=True)[0].tolist()
-        text = texts.STOP_ADDED.format(row=self._row(edge), frame=style.number(frame))
+        text = texts.STOP_ADDED.format(
+            row=row_name(self.session.document, edge), frame=style.number(frame)
+        )
         made = self.session.edit(lambda document: document.stop(edge, frame=frame, rgb=rgb), text)
         if made is not None:
             self.session.select(made)
@@ -471,7 +458,7 @@ class TimelineView(QWidget):
             if start < self.session.frame < end:
                 self.add_stop(content.edge_ids[edge], float(self.session.frame))
                 return
-        selected = self._row(self.session.selection[0])
+        selected = row_name(self.session.document, self.session.selection[0])
         self.session.say(texts.NO_STOP_HERE.format(row=selected), "warning")
 
     # -------------------------------------------------------------------------------- the keyboard

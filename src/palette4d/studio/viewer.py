@@ -19,13 +19,14 @@ from PySide6.QtWidgets import QWidget
 
 from palette4d.grade.picks import Area
 from palette4d.studio import texts
+from palette4d.studio.paint import image_of
 from palette4d.studio.pixels import place_between, probe_at
 from palette4d.studio.player import Region
 from palette4d.studio.preview import NO_PIXELS, Grade, Picture, Preview, Request
 from palette4d.studio.session import Session
 from palette4d.studio.states import Place
 from palette4d.studio.viewer_cross import Cross
-from palette4d.studio.viewer_paint import ViewerPainter, hatched, image_of
+from palette4d.studio.viewer_paint import ViewerPainter, hatched
 
 #: Pixels of the screen within which the pointer takes the wipe's line, and a press is a click.
 NEAR_WIPE, CLICK = 6, 4

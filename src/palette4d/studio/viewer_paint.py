@@ -23,6 +23,7 @@ from PySide6.QtGui import (
 from palette4d.grade.picks import Pick
 from palette4d.studio import texts, theme
 from palette4d.studio.drafts import DRAFT
+from palette4d.studio.paint import image_of
 from palette4d.studio.preview import MATTE_GREY, REST_LIFT, REST_LIGHT
 from palette4d.studio.row_names import row_name
 from palette4d.studio.screen_colours import on_screen
@@ -162,8 +163,8 @@ class ViewerPainter:
         """Draw the picks (rings) and holds (squares) of this frame, with their colours."""
         session = self.session
         place = session.place
-        # While its colour is dragged, it is one of the picks.
-        if place is not None and place.frame == session.frame and not session.dragging:
+        made = session.dragging and session.draft is not None  # then it is one of the picks
+        if place is not None and place.frame == session.frame and not made:
             box = self._mark(painter, place.x, place.y, place.box, hold=False, cross=True)
             inspected = np.array([place.colour, place.colour])
             _flag(painter, box, texts.NEW_PICK, on_screen(session, inspected), bright=True)
@@ -291,7 +292,9 @@ class ViewerPainter:
         colours = self._palette_colours()
         for id_, share in shares:
             painter.setPen(QColor(theme.TEXT))
-            name = measure.elidedText(self._named(id_), Qt.TextElideMode.ElideRight, named)
+            name = measure.elidedText(
+                row_name(self.session.document, id_), Qt.TextElideMode.ElideRight, named
+            )
             painter.drawText(QPointF(box.left() + 8, y), name)
             left = box.left() + named + 16
             full = QRectF(left, y - measure.ascent() + 3, width - named - 52, measure.ascent() - 4)
@@ -301,10 +304,6 @@ class ViewerPainter:
             painter.fillRect(part, colours.get(id_, QColor(theme.FAINT)))
             painter.drawText(QPointF(full.right() + 6, y), f"{share:.0%}")
             y += line
-
-    def _named(self, id_: str) -> str:
-        document = self.session.document
-        return id_ if document is None else row_name(document.grade, id_)
 
     def _draw_legend(self, painter: QPainter) -> None:
         """Say what the matte shows, with its scale from grey to the picture."""
@@ -319,7 +318,7 @@ class ViewerPainter:
             has, lacks = texts.PICK_MATTE, texts.NO_PICK_MATTE
         if shown == DRAFT:
             has = lacks = texts.DRAFT_MATTE
-        words = (has if picture.matte else lacks).format(id=self._named(shown))
+        words = (has if picture.matte else lacks).format(id=row_name(self.session.document, shown))
         ends = texts.MATTE_ENDS
         wide = 90.0
         widths = [measure.horizontalAdvance(text) for text in (words, *ends)]
@@ -371,13 +370,6 @@ class ViewerPainter:
         painter.drawText(box, int(flags), text)
 
 
-def image_of(pixels: NDArray[np.uint8]) -> QImage:
-    """Return (h, w, 4) pixels in the format that Qt draws twice as fast as another one."""
-    height, width = pixels.shape[:2]
-    image = QImage(pixels.data, width, height, 4 * width, QImage.Format.Format_RGBX8888)
-    return image.convertToFormat(QImage.Format.Format_RGB32)
-
-
 def hatched(mask: NDArray[np.uint8]) -> QImage:
     """Return an overlay with stripes where the mask is set."""
     y, x = np.indices(mask.shape)
@@ -385,11 +377,7 @@ def hatched(mask: NDArray[np.uint8]) -> QImage:
     overlay = np.zeros((*mask.shape, 4), np.uint8)
     overlay[..., 3] = np.where(mask > 0, 190, 0)
     overlay[..., :3] = np.where((mask > 0) & stripes, 190, 0)[..., None]  # premultiplied white
-    height, width = mask.shape
-    image = QImage(
-        overlay.data, width, height, 4 * width, QImage.Format.Format_RGBA8888_Premultiplied
-    )
-    return image.copy()
+    return image_of(overlay, QImage.Format.Format_RGBA8888_Premultiplied)
 
 
 def _figure(value: float) -> str:

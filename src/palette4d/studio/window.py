@@ -1,38 +1,30 @@
 """The main window: viewer, timeline, solid and inspector of one session, and its menus."""
 
-import contextlib
 import functools
-import time
 from collections.abc import Callable
 
 from PySide6.QtCore import (
     QByteArray,
     QEvent,
-    QMimeData,
     QObject,
     QSettings,
     Qt,
     QTimer,
-    QUrl,
-    Signal,
 )
 from PySide6.QtGui import (
     QAction,
     QActionGroup,
     QCloseEvent,
-    QDrag,
     QDragEnterEvent,
     QDropEvent,
     QKeyEvent,
     QKeySequence,
-    QMouseEvent,
 )
 from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractSpinBox,
     QComboBox,
     QDockWidget,
-    QLabel,
     QLineEdit,
     QMainWindow,
     QMessageBox,
@@ -41,7 +33,7 @@ from PySide6.QtWidgets import (
 )
 
 from palette4d.common.errors import Palette4dError
-from palette4d.studio import menu_entries, texts, theme
+from palette4d.studio import menu_entries, texts
 from palette4d.studio.banner import Banner
 from palette4d.studio.file_menu import FileMenu
 from palette4d.studio.help_menu import HelpMenu
@@ -58,8 +50,10 @@ from palette4d.studio.shortcuts import Shortcuts
 from palette4d.studio.shot_list import Shots
 from palette4d.studio.solid_view import SolidView
 from palette4d.studio.start_page import StartPage
+from palette4d.studio.status_line import StatusLine
 from palette4d.studio.timeline_view import TimelineView
 from palette4d.studio.transport import Playback, Transport
+from palette4d.studio.turns import Post, Turns
 from palette4d.studio.verb_dialog import VerbDialog
 from palette4d.studio.verb_menu import VerbMenu
 from palette4d.studio.versions_gallery import Gallery
@@ -67,98 +61,8 @@ from palette4d.studio.viewer import Viewer
 
 #: Milliseconds between two looks at the file.
 TICK = 100
-#: Milliseconds between two looks whether the picture is shown, so that panels can be told; the
-#: longest wait for it, and between two panels.
-LOOK, LONGEST_REST = 5, 120
 #: Shows the picture before while it is down.
 COMPARE_KEY = Qt.Key.Key_C
-
-
-class _Post(QObject):
-    """Brings calls of other threads to the window's thread."""
-
-    called = Signal(object)
-
-    def __init__(self, parent: QObject) -> None:
-        super().__init__(parent)
-        self.called.connect(lambda call: call(), Qt.ConnectionType.QueuedConnection)
-
-    def post(self, call: Callable[[], object]) -> None:
-        """Call a function on the window's thread; nothing happens when the window is gone."""
-        with contextlib.suppress(RuntimeError):  # a thread may end after the window
-            self.called.emit(call)
-
-
-class Turns(QObject):
-    """Tells panels what changed, one a turn, when the picture is shown.
-
-    While something is dragged, a panel is told at most the newest state, and panels take at most a
-    third of the time.
-
-    Parameters
-    ----------
-    parent : QObject
-    shown : callable
-        Whether the picture of now is shown.
-    """
-
-    def __init__(self, parent: QObject, shown: Callable[[], bool]) -> None:
-        super().__init__(parent)
-        self._shown, self._asked = shown, 0.0
-        self._waiting: dict[Callable[[], object], None] = {}
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.timeout.connect(self._next)
-
-    def later(self, call: Callable[[], object]) -> None:
-        """Call a function soon; once, however often it is asked for until then."""
-        self._waiting[call] = None
-        if not self._timer.isActive():
-            self._asked = time.monotonic()
-            self._timer.start(LOOK)
-
-    @property
-    def settled(self) -> bool:
-        """Whether all panels are told."""
-        return not self._waiting
-
-    def _next(self) -> None:
-        start = time.monotonic()
-        if not self._shown() and start < self._asked + LONGEST_REST / 1000:
-            self._timer.start(LOOK)
-            return
-        call = next(iter(self._waiting), None)
-        if call is None:
-            return
-        del self._waiting[call]
-        call()
-        panel = getattr(call, "__self__", None)
-        if isinstance(panel, QWidget) and not panel.isWindow():  # a window would paint all panels
-            panel.repaint()
-        self._asked = time.monotonic()
-        took = self._asked - start
-        if self._waiting:
-            self._timer.start(round(min(2000 * took, LONGEST_REST)))
-
-
-class FileLabel(QLabel):
-    """The file's name and state; the sidecar can be dragged out of it, into a host for example."""
-
-    def __init__(self, session: Session) -> None:
-        super().__init__()
-        self.session = session
-
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Drag the sidecar out."""
-        path = self.session.path
-        if path is None or not event.buttons() & Qt.MouseButton.LeftButton:
-            return
-        self.session.save()
-        data = QMimeData()
-        data.setUrls([QUrl.fromLocalFile(str(path.absolute()))])
-        drag = QDrag(self)
-        drag.setMimeData(data)
-        drag.exec(Qt.DropAction.CopyAction)
 
 
 class Window(QMainWindow):
@@ -169,7 +73,7 @@ class Window(QMainWindow):
         super().__init__()
         self.session = session
         self.settings = settings if settings is not None else QSettings("palette4d", "studio")
-        session.post = _Post(self).post
+        session.post = Post(self).post
         self.setWindowTitle(f"{texts.TITLE}[*]")
         self.setAcceptDrops(True)
         self.setDockNestingEnabled(True)
@@ -197,7 +101,8 @@ class Window(QMainWindow):
         self.setCentralWidget(middle)
         self._make_docks()
         self._make_fields()
-        self._make_status()
+        self.line = StatusLine(session, self.viewer)
+        self.setStatusBar(self.line)
         self.commands, self.verbs, self.help = MenuActions(self), VerbMenu(self), HelpMenu(self)
         files, verbs = self.files, self.verbs
         self.banner = Banner(
@@ -356,22 +261,6 @@ class Window(QMainWindow):
         self.addDockWidget(area, dock)
         return dock
 
-    def _make_status(self) -> None:
-        bar = self.statusBar()
-        bar.setSizeGripEnabled(False)
-        self.says = QLabel()
-        self.says.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.says.setMinimumWidth(100)
-        self.file_facts, self.view_facts = FileLabel(self.session), QLabel()
-        bar.addWidget(self.file_facts)
-        bar.addWidget(self.says, 1)
-        bar.addPermanentWidget(self.view_facts)
-        for label in (self.says, self.file_facts, self.view_facts):
-            label.setTextFormat(Qt.TextFormat.PlainText)
-        for label in (self.file_facts, self.view_facts):
-            label.setStyleSheet(f"color: {theme.FAINT}; padding: 2px 8px")
-            label.setMinimumWidth(1)  # a long name or note makes no wide window
-
     def _make_menus(self) -> None:
         self.menus = {menu: self.menuBar().addMenu(title) for menu, title in texts.MENUS.items()}
         group = -1
@@ -442,39 +331,8 @@ class Window(QMainWindow):
 
     def _show(self) -> None:
         session, view = self.session, self.session.view
-        document, status = session.document, session.status
-        colour = {"info": theme.TEXT, "warning": theme.WARNING, "error": theme.ERROR}
-        self.says.setStyleSheet(f"color: {colour[status.level]}")
-        sign = {"info": "", "warning": texts.WARNING_SIGN, "error": texts.ERROR_SIGN}
-        self.says.setText(sign[status.level] + status.text)
-        self.says.setToolTip(theme.plain(status.text))
-        facts = []
-        if session.path is not None and document is not None:
-            saved = session.saved and not session.dragging
-            facts = [session.path.name, texts.SAVED if saved else texts.UNSAVED]
-            facts.append(texts.HANDLES.format(count=len(document.grade.core.polytope.vertex_ids)))
-            picks = sum(kind == "pick" for kind, _ in document.grade.state)
-            if picks:
-                facts.append(texts.PICKS.format(count=picks))
-        elif session.clip is not None:
-            facts = [session.clip.name, texts.NO_PALETTE]
-        self.file_facts.setText("  ·  ".join(facts))
-        tips = ["  ·  ".join(facts), *([texts.DRAG_OUT] if session.path is not None else [])]
-        self.file_facts.setToolTip(theme.plain("\n".join(tips)))
-        display = session.display
-        shown = ""
-        if display is not None and not display.known and session.clip is not None:
-            shown = texts.AS_IS_STATUS
-        elif display is not None and self.viewer.picture is not None:
-            error = self.viewer.picture.quick_error
-            if error * 255 >= 0.05:  # less is not seen
-                shown = texts.LUT_ERROR.format(error=error * 255)
-        if view.outside and self.viewer.picture is not None:
-            share = self.viewer.picture.share
-            few = 0 < share < 0.0005
-            shown += "  " + texts.OUTSIDE.format(share=texts.NEARLY_NONE if few else f"{share:.1%}")
-        self.view_facts.setText(shown)
-        self.view_facts.setToolTip(shown)
+        document = session.document
+        self.line.show_state()
         name = session.path.name if session.path is not None else ""
         title = name or (session.clip.name if session.clip is not None else "")
         self.setWindowTitle(f"{title}[*] — {texts.TITLE}" if title else texts.TITLE)
