@@ -105,6 +105,21 @@ def test_an_error_stays_until_it_is_closed_and_leaves_with_its_clip(
     assert session.status.level == "info"
 
 
+def test_a_second_thing_that_is_wrong_is_seen_too(
+    window: Window, sidecar: Path, tmp_path: Path, qtbot: Any
+) -> None:
+    fields = json.loads(sidecar.read_text())
+    fields["clip"]["source"] = "gone/frame.####.png"
+    sidecar.write_text(json.dumps(fields))
+    window.open_path(str(sidecar))
+    qtbot.waitUntil(lambda: window.banner.height() > 10)
+    one = window.banner.height()
+    (tmp_path / "bad.mp4").write_bytes(b"no movie")
+    window.open_path(str(tmp_path / "bad.mp4"))
+    qtbot.waitUntil(lambda: window.banner.height() > 1.5 * one)
+    assert texts.NO_CLIP in said(window)
+
+
 def test_what_cannot_be_saved_is_saved_elsewhere(
     opened: Window, sidecar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

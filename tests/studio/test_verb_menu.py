@@ -276,7 +276,11 @@ def test_undo_brings_back_the_palette_before_an_analysis(
 
 
 def test_where_media_are_read_only_another_place_is_proposed(
-    window: Window, analysed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    window: Window,
+    analysed: Path,
+    tmp_path: Path,
+    qtbot: Any,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     shutil.copytree(analysed / "clip", tmp_path / "media")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
@@ -286,4 +290,9 @@ def test_where_media_are_read_only_another_place_is_proposed(
     )
     window.open_path(str(tmp_path / "media"))
     (dialog,) = window.verbs.dialogs
-    assert dialog.value("-o") == str(tmp_path / "home" / "palette4d" / "frame.p4d.json")
+    out = tmp_path / "home" / "palette4d" / "frame.p4d.json"
+    assert dialog.value("-o") == str(out)
+    assert str(out.parent) in window.session.status.text
+    dialog.start()
+    qtbot.waitUntil(lambda: dialog not in window.verbs.dialogs, timeout=120_000)
+    assert window.session.path == out

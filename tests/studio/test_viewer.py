@@ -257,6 +257,14 @@ def test_holding_the_key_shows_the_picture_before(opened: Window, settle: Settle
     assert np.array_equal(seen(opened)[60:], after[60:])
 
 
+def test_the_key_may_come_up_over_a_menu(opened: Window) -> None:
+    QTest.keyPress(opened, Qt.Key.Key_C)
+    assert opened.viewer.comparing
+    menu = opened.menus["file"]
+    QTest.keyRelease(menu, Qt.Key.Key_C)
+    assert not opened.viewer.comparing
+
+
 def test_the_probe_says_what_the_frame_has(opened: Window, settle: Settle) -> None:
     id_ = busiest(opened)
     opened.session.edit(lambda document: document.set(id_, rgb=(0.9, 0.3, 0.1)))

@@ -158,7 +158,9 @@ class Banner(QFrame):
                 widget.hide()
                 widget.deleteLater()
         for key, entry in list(reversed(self.entries.items()))[:MOST]:
-            self._rows.addWidget(self._row(key, entry))
+            row = self._row(key, entry)
+            self._rows.addWidget(row)
+            row.show()  # what is not shown yet takes no room in `_fit`
         self.setVisible(bool(self.entries))
         self._fit()
 

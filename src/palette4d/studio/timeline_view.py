@@ -405,7 +405,8 @@ class TimelineView(QWidget):
             line = f"{kind} {disc.id}: {self._called(disc.id)}\n{before}"
             return line if before == after else f"{line} → {after}"
         if hit.what == "band":
-            return f"{row_name(self.session.document, hit.id)}: {self._called(hit.id)}\n{texts.ROW_TIP}"
+            name = row_name(self.session.document, hit.id)
+            return f"{name}: {self._called(hit.id)}\n{texts.ROW_TIP}"
         for pick, _ in self.places.lanes() if hit.what == "pick" else ():
             if pick.id == hit.id:
                 return f"{pick.id}: {grade_steps.pick_tip(self.session, pick)}"

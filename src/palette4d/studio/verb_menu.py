@@ -1,5 +1,6 @@
 """The long work that the menus begin: each is a verb of the command line in a dialog."""
 
+import contextlib
 import functools
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -64,6 +65,12 @@ def lut_fields(*left_out: str, usual: str = "") -> list[Field]:
     return [field for field in found if field.flag not in left_out]
 
 
+def _make_own_folder() -> None:
+    """Make the folder that is proposed; if it cannot be made, the verb says why."""
+    with contextlib.suppress(OSError):
+        (Path.home() / OWN_FOLDER).mkdir(parents=True, exist_ok=True)
+
+
 class VerbMenu:
     """The work of a window."""
 
@@ -81,6 +88,11 @@ class VerbMenu:
     ) -> VerbDialog:
         self.session.save()
         dialog = VerbDialog(self.window, title, verb, fields, self.session.post, done)
+        own = Path.home() / OWN_FOLDER
+        for field in fields:
+            if field.kind in ("save", "folder") and own == Path(field.value).parent:
+                dialog.started.connect(_make_own_folder)
+                self.session.say(texts.ELSEWHERE.format(folder=own), "warning")
         dialog.show()
         self.dialogs.append(dialog)
         dialog.destroyed.connect(lambda: self.dialogs.remove(dialog))

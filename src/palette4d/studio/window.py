@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import (
     QByteArray,
+    QCoreApplication,
     QEvent,
     QObject,
     QSettings,
@@ -197,7 +198,20 @@ class Window(QMainWindow):
         return super().event(event)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Leave undo and redo to the document, unless text was typed that is not entered yet."""
+        """Leave undo and redo to the document, unless text was typed that is not entered yet.
+
+        The key of hold-to-compare may come up over a menu or a dialog, or in another program.
+        """
+        if self.viewer.comparing and (
+            event.type() == QEvent.Type.ApplicationDeactivate
+            or (
+                event.type() == QEvent.Type.KeyRelease
+                and isinstance(event, QKeyEvent)
+                and event.key() == COMPARE_KEY
+                and not event.isAutoRepeat()
+            )
+        ):
+            self._compare(False)
         if (
             event.type() == QEvent.Type.ShortcutOverride
             and isinstance(event, QKeyEvent)
@@ -482,22 +496,20 @@ class Window(QMainWindow):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Show the picture before while the key of hold-to-compare is down."""
-        if self._compares(event):
-            self.viewer.hold_to_compare(True)
+        plain = event.modifiers() == Qt.KeyboardModifier.NoModifier
+        if event.key() == COMPARE_KEY and plain and not event.isAutoRepeat():
+            self._compare(True)
         else:
             super().keyPressEvent(event)
 
-    def keyReleaseEvent(self, event: QKeyEvent) -> None:
-        """Show the picture after again."""
-        if event.key() == COMPARE_KEY and not event.isAutoRepeat():
-            self.viewer.hold_to_compare(False)
-        else:
-            super().keyReleaseEvent(event)
-
-    @staticmethod
-    def _compares(event: QKeyEvent) -> bool:
-        plain = event.modifiers() == Qt.KeyboardModifier.NoModifier
-        return event.key() == COMPARE_KEY and plain and not event.isAutoRepeat()
+    def _compare(self, down: bool) -> None:
+        """Watch all keys while the picture before is shown."""
+        app = QCoreApplication.instance()
+        if app is not None and down:
+            app.installEventFilter(self)
+        elif app is not None:
+            app.removeEventFilter(self)
+        self.viewer.hold_to_compare(down)
 
 
 def line_of(field: QAbstractSpinBox | QLineEdit) -> QLineEdit:
