@@ -50,8 +50,10 @@ def test_a_screenshot_of_what_cannot_be_opened_fails_and_a_frame_beyond_is_noted
     assert out.read_bytes() != drawn
     frame = tmp_path / "clip" / "frame.0001.png"
     source = frame.read_bytes()
+    frame.unlink()  # it is a link
+    frame.write_bytes(source)
     with pytest.raises(Palette4dError, match="read for this output"):
-        app.run(str(sidecar), screenshot=frame, size=(900, 600), force=True)
+        app.run(str(sidecar), clip=str(frame.parent), screenshot=frame, force=True)
     assert frame.read_bytes() == source
     out.unlink()
     sidecar.write_text("{")

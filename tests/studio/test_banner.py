@@ -37,7 +37,7 @@ def push(window: Window, name: str) -> None:
 
 def own_clip(sidecar: Path, analysed: Path) -> Path:
     """A copy of the clip, which the test may break."""
-    (sidecar.parent / "clip").unlink()
+    shutil.rmtree(sidecar.parent / "clip")
     shutil.copytree(analysed / "clip", sidecar.parent / "clip")
     return sidecar.parent / "clip"
 
@@ -71,10 +71,14 @@ def test_a_frame_that_was_missing_is_shown_when_it_comes(
 
 
 def test_a_clip_that_is_not_found_can_be_found(
-    window: Window, sidecar: Path, settle: Settle, monkeypatch: pytest.MonkeyPatch
+    window: Window,
+    sidecar: Path,
+    analysed: Path,
+    settle: Settle,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    clip = str(sidecar.with_name("clip").resolve() / "frame.0001.png")
-    sidecar.with_name("clip").unlink()
+    clip = str(analysed / "clip" / "frame.0001.png")
+    shutil.rmtree(sidecar.with_name("clip"))
     fields = json.loads(sidecar.read_text())
     fields["clip"]["source"] = "clip/frame.####.png"
     sidecar.write_text(json.dumps(fields))

@@ -20,7 +20,7 @@ from palette4d.studio.window import Window
 
 
 def test_a_clip_that_vanished_is_said_and_the_palette_stays(window: Window, sidecar: Path) -> None:
-    (sidecar.parent / "clip").unlink()
+    shutil.rmtree(sidecar.parent / "clip")
     fields = json.loads(sidecar.read_text())
     fields["clip"]["source"] = "clip/frame.####.png"
     sidecar.write_text(json.dumps(fields))

@@ -174,6 +174,7 @@ def test_a_row_at_the_playhead_gets_a_stop(panel: Inspector) -> None:
 
 
 def test_the_ramp_of_a_handle_and_of_the_clip(panel: Inspector) -> None:
+    assert panel.ramp.isEnabled()  # also without another colour
     panel.boxes["R"].setValue(0.5)
     panel.ramp.setCurrentIndex(panel.ramp.findData("hold"))
     panel.ramp.activated.emit(panel.ramp.currentIndex())

@@ -236,6 +236,10 @@ def test_where_a_pick_is_in_another_frame_is_clicked(
     words = ["pick", "--frame", "9", "--pixel", "52,34", "--with", "p1"]
     assert main(["edit", str(twin), *words]) == 0
     assert sidecar.read_bytes() == twin.read_bytes()
+    grade_steps.set_range(session, "p1", 1, 7)
+    qtbot.waitUntil(lambda: not session.following, timeout=20_000)
+    settle(opened)
+    assert texts.NOT_HERE.format(frame=9) in panel.takes.words.text()
     session.go(6)
     settle(opened)
     assert not panel.takes.button.isVisibleTo(panel)

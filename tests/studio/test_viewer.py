@@ -333,6 +333,9 @@ def test_pointing_at_a_pick_shows_what_it_takes(opened: Window, settle: Settle) 
     QTest.keyClick(opened, Qt.Key.Key_M)
     settle(opened)
     assert np.array_equal(pixels_of(opened), matte)
+    session.edit(lambda document: document.change_pick("p1", to=(0.02, 0.02, 0.03)))
+    settle(opened)
+    assert pixels_of(opened)[60, 60].min() > dark.mean() + 25  # also a dark colour is seen
     session.edit(lambda document: document.change_pick("p1", enabled=False))
     settle(opened)
     assert not opened.viewer.picture.matte
@@ -378,7 +381,7 @@ def test_zoom_keeps_the_point_and_one_to_one_has_the_frames_pixels(
 def test_a_frame_that_does_not_decode_is_a_message(
     window: Window, sidecar: Path, analysed: Path, qtbot: Any, settle: Settle
 ) -> None:
-    (sidecar.parent / "clip").unlink()
+    shutil.rmtree(sidecar.parent / "clip")
     shutil.copytree(analysed / "clip", sidecar.parent / "clip")
     broken = sidecar.parent / "clip" / "frame.0005.png"
     window.open_path(str(sidecar), str(sidecar.parent / "clip"))

@@ -192,6 +192,13 @@ def range_of(session: Session, pick: Pick) -> tuple[float, float]:
     return float(first if start is None else start), float(last if until is None else until)
 
 
+def acts_at(session: Session, pick: Pick, frame: float) -> bool:
+    """Return whether a frame is in a pick's range or its fades."""
+    start, until = range_of(session, pick)
+    before, after = pick.fades
+    return start - before <= frame <= until + after
+
+
 def set_range(session: Session, id_: str, start: float, until: float) -> None:
     """Give a pick or hold a range; at the clip's ends it has no limit (`change`)."""
     first, last, _ = session.frames

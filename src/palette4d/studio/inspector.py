@@ -372,7 +372,7 @@ class Inspector(QWidget):
         own = None
         if document is not None and target is not None and target.id in document.grade.settings:
             own = document.grade.settings[target.id].ramp
-        can = target is None or (document is not None and target.id in document.grade.settings)
+        can = target is None or target.kind in ("vertex", "stop")
         self.ramp.setEnabled(document is not None and can)
         shown = own
         if target is None and document is not None:

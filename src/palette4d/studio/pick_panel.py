@@ -338,8 +338,10 @@ class PickPanel(QWidget):
             words = says.format(share=percent(found.share), frame=found.frame)
             frame, share = self._here or (found.frame, 0.0)
             if frame == self.session.frame != found.frame:
-                words = f"{words} {texts.HERE.format(share=percent(share), frame=frame)}"
-                self.takes.button.setVisible(bool(pick.path))
+                acts = grade_steps.acts_at(self.session, pick, frame)
+                here = texts.HERE if acts else texts.NOT_HERE
+                words = f"{words} {here.format(share=percent(share), frame=frame)}"
+                self.takes.button.setVisible(acts and bool(pick.path))
             self.takes.say(words)
             for line, note in zip(self.notes, found.notes, strict=False):
                 at = note.place

@@ -43,6 +43,8 @@ OUTSIDE_POINTS = 60_000
 MATTE_GREY, MATTE_SHOWS = 58, 0.12
 #: Pixels that a pick leaves alone, beside its matte: this share of their lightness, and a grey.
 REST_LIGHT, REST_LIFT = 0.32, 12
+#: Light that is added to pixels that it takes, by their luminance: dark ones would not be seen.
+LIFT = np.rint((1 - np.arange(256) / 255) ** 4 * 100).astype(np.uint16)
 
 
 @dataclass(frozen=True)
@@ -490,14 +492,15 @@ def _highlighted(picture: U8, matte: F32) -> U8:
 
 
 def _singled_out(picture: U8, matte: F32) -> U8:
-    """Return the picture where a pick acts, and dark and grey elsewhere."""
+    """Return the picture where a pick acts, its dark pixels lighter; dark and grey elsewhere."""
     weight = (matte * np.float32(256)).astype(np.uint16)
     colours = picture[..., :3].astype(np.uint16)
     grey = colours @ np.array([54, 183, 19], np.uint16) >> 8  # Rec.709's luminance weights
     rest = ((grey * np.uint16(256 * REST_LIGHT) >> 8) + np.uint16(REST_LIFT)) * (256 - weight)
-    result = picture.copy()
+    lift, result = LIFT[grey], picture.copy()
     for channel in range(3):
-        result[..., channel] = (colours[..., channel] * weight + rest) >> 8
+        lit = np.minimum(colours[..., channel] + lift, 255)
+        result[..., channel] = (lit * weight + rest) >> 8
     return result
 
 
