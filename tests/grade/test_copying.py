@@ -9,7 +9,7 @@ import pytest
 
 from palette4d.colour.encoding_conversion import between
 from palette4d.common.errors import Palette4dError
-from palette4d.grade import reanalysis, sidecar
+from palette4d.grade import copying, reanalysis, sidecar
 from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.copying import Fit
 from palette4d.grade.document import Document
@@ -257,6 +257,19 @@ def test_ids_of_a_palette_that_was_found_anew_say_nothing(tmp_path: Path) -> Non
     new = Document(found)
     new.save(path, on_edits="keep")
     assert any("the grade was copied" in note for note in new.notes)
+
+
+def test_99_of_100_colours_stay_below_the_largest_difference() -> None:
+    colours = np.random.default_rng(3).uniform(0.1, 0.9, (100, 3))
+    fields = members("split")
+    fields["colours"] = [{"frame": 0, "rgbw": [[*rgb, 0.01] for rgb in colours.tolist()]}]
+    source = Document(members("split"))
+    source.set("v1", rgb=(0.6, 0.1, 0.2))
+    fit = copying.fit(Document(fields).grade, source.grade)
+    moved = source.recolour(colours.astype(np.float32)[None], 0, space="palette")[0]
+    off = np.sort(np.abs(moved - colours).max(axis=1))
+    assert off[98] > 1.5 * off[50]
+    assert (fit.largest, fit.mean) == pytest.approx((off[98], off.mean()), abs=1e-6)
 
 
 @pytest.mark.parametrize("moves", [True, False])

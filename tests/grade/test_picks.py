@@ -1,5 +1,6 @@
 """Picks as values: their change along a path, where it stays alike, and what is said of it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from palette4d.grade import mattes, pick_edits
 from palette4d.grade.clip_colours import ClipColours
 from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.document import Document
+from palette4d.grade.later import with_readings
 from palette4d.grade.picks import PathKey, Pick
 
 GREY = (0.5, 0.5, 0.5)
@@ -62,3 +64,18 @@ def test_the_nearer_colours_of_the_clip_count_more() -> None:
     stored = [{"frame": frame, "rgbw": [[*GREY, 1.0]]} for frame in (0, 10)]
     found = ClipColours(grade.core.polytope, {"colours": stored}).colours_at(2)
     assert found[:, 3] == pytest.approx([0.8, 0.2])
+
+
+def test_readings_are_taken_by_the_pick_that_they_are_of() -> None:
+    old = Pick("p1", "pick", 0, GREY, (0.6, 0.5, 0.5))
+    readings = ((old, replace(old, matte="m1")),)
+    for own, matte in (
+        (old, "m1"),
+        (replace(old, reach=1.0), "m1"),  # a matte does not depend on it
+        (replace(old, rgb=(0.4, 0.5, 0.5)), None),
+        (replace(old, matte="m2"), "m2"),
+    ):
+        assert with_readings({("pick", "p1"): own}, readings) == {
+            ("pick", "p1"): replace(own, matte=matte)
+        }
+    assert with_readings({}, readings) == {}
