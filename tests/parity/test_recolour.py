@@ -103,7 +103,7 @@ def changing_picks() -> list[Document]:
 def test_the_core_has_the_changes_of_the_reference(picks: list[Document]) -> None:
     document = picked(DOCUMENTS["changes"], [{**one, "matte": "a"} for one in picks], GRIDS)
     sidecar = CORE.sidecar(document)
-    for frame in np.arange(-2, 33, 0.75).tolist():
+    for frame in np.arange(-2, 33, 1.25).tolist():
         at = min(max(frame, 0.0), 30.0)
         found = [made[:3] for made in sidecar.picks_at(frame).picks]
         expected = [
