@@ -33,7 +33,7 @@ READY, PATIENCE = 4, 0.6
 #: Milliseconds between two looks at the clock while playing.
 CLOCK = 4
 #: The most characters of a version's name on a button.
-LONGEST_NAME = 8
+LONGEST_NAME = 12
 #: The least width of the bar.
 LEAST_WIDTH = 380
 #: Seconds between two requests for frames that are late.
@@ -325,7 +325,8 @@ class Transport(QWidget):
         self.gamma.setValue(session.view.gamma)
         self.compare[session.view.compare].setChecked(True)
         for side, version in (("before", session.view.version), ("after", session.view.after)):
-            self.compare[side].setText(version[:LONGEST_NAME] or texts.COMPARE[side])
+            name = version if len(version) <= LONGEST_NAME else f"{version[: LONGEST_NAME - 1]}…"
+            self.compare[side].setText(name or texts.COMPARE[side])
             self.compare[side].setToolTip(theme.plain(texts.SHOWS.format(name=version or side)))
         wanted = (
             []
