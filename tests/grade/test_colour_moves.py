@@ -248,13 +248,15 @@ def test_a_range_fades_linearly_or_smoothly() -> None:
         (None, [0, 0.25, 0.5, 0.75, 1]),
         ("smooth", [0, 5 / 32, 0.5, 27 / 32, 1]),
     ):
-        one, two = document("split"), document("split")
-        two.adjust("e1", track=True, by=[0.5, 0, 0], start=5, until=7, fade=4, ramp=ramp)
-        found = [
-            (two.grade.colour("e1", frame=t)[0] - one.grade.colour("e1", frame=t)[0]) / 0.5
-            for t in (1, 2, 3, 4, 5)
-        ]
-        assert found == pytest.approx(expected, abs=1e-9)
+        for (start, until), times in (((5, 7), (1, 2, 3, 4, 5)), ((2, 4), (8, 7, 6, 5, 4))):
+            one, two = document("split"), document("split")
+            offset = {"by": [0.5, 0, 0], "start": start, "until": until, "fade": 4, "ramp": ramp}
+            two.adjust("e1", track=True, **offset)
+            found = [
+                (two.grade.colour("e1", frame=t)[0] - one.grade.colour("e1", frame=t)[0]) / 0.5
+                for t in times
+            ]
+            assert found == pytest.approx(expected, abs=1e-9)
 
 
 def test_near_within_a_range() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from palette4d import Document
 from palette4d.grade.handle_names import vertex_colours
 from palette4d.grade.handles import Handles
-from palette4d.grade.tracks import tracks_of
+from palette4d.grade.tracks import Chain, Run, runs_of, tracks_of
 
 SPLIT = Path(__file__).resolve().parent.parent / "golden/sidecars/v1_split.p4d.json"
 
@@ -120,3 +120,9 @@ def test_encodings_do_not_change_names() -> None:
         for colours, encoding in ((display, "sRGB"), (linear, "lin_rec709_srgb"))
     )
     assert seen == light
+
+
+def test_a_label_changes_half_way_between_vertices() -> None:
+    chain = Chain((0, 1, 2), (0, 1), 0.0, 20.0)
+    runs = runs_of(chain, [0.0, 10.0, 20.0], ["red", "red", "blue"])
+    assert runs == [Run((0, 1), 0.0, 15.0), Run((2,), 15.0, 20.0)]
