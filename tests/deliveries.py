@@ -238,4 +238,4 @@ def display_matrix(path: Path) -> bool:
     """Whether a movie has a display matrix."""
     with av.open(str(path)) as container:
         picture = next(container.decode(video=0))
-        return any(one.type == Type.DISPLAYMATRIX for one in picture.side_data)
+        return picture.side_data.get(Type.DISPLAYMATRIX) is not None
