@@ -18,7 +18,7 @@ from palette4d.colour.conversion_steps import Step
 from palette4d.colour.ocio_config import (
     chosen_config,
     colour_space,
-    load_config,
+    config_of_sidecar,
     space_of_encoding,
 )
 from palette4d.common.errors import Arg, Palette4dError
@@ -80,7 +80,8 @@ def space_of(
         steps = json.loads(data)["clip"]["conversion"]["steps"]
         return BakeSpace(own.input_space, tuple(steps), clip, clip)
     if config_name is None and own is not None:
-        config, config_name = load_config(own.config, f"{Arg('ocio_config')}"), own.config
+        config_name = own.config
+        config = config_of_sidecar(config_name, f"{Arg('ocio_config')}")
     else:
         config, config_name = chosen_config(config_name)
     name = str(colour_space(config, config_name, wanted, Arg("space", wanted)).getName())

@@ -11,13 +11,15 @@ from palette4d.common.errors import Palette4dError
 
 
 def piece(value: int, threads: int) -> tuple[int, int]:
-    """Square a number; refuse 3, fall over 4, and let 5 end the process."""
+    """Square a number; refuse 3, fall over 4, let 5 end the process, and never reach 7."""
     if value == 3:
         raise Palette4dError("three is refused")
     if value == 4:
         raise ZeroDivisionError
     if value == 5:
         os.kill(os.getpid(), signal.SIGKILL)
+    if value == 7:
+        return piece(7, threads)
     return value * value, threads
 
 

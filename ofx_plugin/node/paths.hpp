@@ -6,6 +6,8 @@
 #include <optional>
 #include <string>
 
+#include "sidecar/file_bytes.hpp"
+
 namespace palette4d::node {
 
 /// Folders in which the node searches sidecars, separated as in PATH.
@@ -16,14 +18,6 @@ inline constexpr std::size_t kLongestPath = 32768;
 
 /// The path that a host gives in UTF-8. On Windows bytes that are no UTF-8 become U+FFFD.
 std::filesystem::path native(const std::string& utf8);
-
-/// The path as calls of the system take it: on Windows a long one gets the prefix without which
-/// 260 characters are the most. Not for people to read.
-std::filesystem::path reachable(const std::filesystem::path& path);
-
-/// The bytes of a regular file, at most `most`; empty where it cannot be read. Never waits,
-/// whatever the file is. Programs may replace or remove it meanwhile, also on Windows.
-std::optional<std::string> bytes_of(const std::filesystem::path& file, std::size_t most);
 
 /// The path (UTF-8) with a leading ~ and $NAME, ${NAME} and %NAME% replaced from the environment.
 /// Unknown names stay as they are.

@@ -1,6 +1,7 @@
 #include "program_file.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cerrno>
 #include <cstring>
@@ -9,8 +10,13 @@
 
 #if !defined(_WIN32)
 #include <fcntl.h>
+#include <grp.h>
+#include <pwd.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#endif
+#if defined(__linux__)
+#include <sys/xattr.h>
 #endif
 
 namespace palette4d::node {
@@ -79,6 +85,25 @@ std::string text_of(const fs::path& file, std::string& problem) {
 }
 
 #if !defined(_WIN32)
+/// Whether a group is the user's own, as some systems give one of the user's name to each.
+bool of_me_alone(gid_t group) {
+    struct passwd user{}, *me = nullptr;
+    struct group about{}, *found = nullptr;
+    std::array<char, 16384> of_user{}, of_group{};
+    return ::getpwuid_r(::geteuid(), &user, of_user.data(), of_user.size(), &me) == 0 && me &&
+           ::getgrgid_r(group, &about, of_group.data(), of_group.size(), &found) == 0 && found &&
+           std::strcmp(user.pw_name, about.gr_name) == 0;
+}
+
+/// Whether a file has an access list: the group's bits are then those of all whom it names.
+bool has_list([[maybe_unused]] const fs::path& path) {
+#if defined(__linux__)
+    return ::getxattr(path.c_str(), "system.posix_acl_access", nullptr, 0) > 0;
+#else
+    return false;
+#endif
+}
+
 /// What is wrong with a file or folder that other users could change; empty: they cannot.
 std::string changeable(const fs::path& path) {
     struct stat about{};
@@ -87,9 +112,7 @@ std::string changeable(const fs::path& path) {
     const bool is_link = S_ISLNK(about.st_mode);  // its mode says nothing
     const bool sticky = S_ISDIR(about.st_mode) && (about.st_mode & S_ISVTX) != 0;
     if (is_link || sticky) return "";
-    // A user's own group, as some systems give to each, is the user.
-    const bool own_group =
-        about.st_gid == 0 || (about.st_uid == ::geteuid() && about.st_gid == ::getegid());
+    const bool own_group = (about.st_gid == 0 || of_me_alone(about.st_gid)) && !has_list(path);
     if ((about.st_mode & S_IWOTH) != 0 || ((about.st_mode & S_IWGRP) != 0 && !own_group)) {
         return path.u8string() + " may be changed by other users";
     }

@@ -8,14 +8,18 @@ import struct
 import subprocess
 import sys
 from collections.abc import Callable
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 
+import access_lists
 import pytest
+from access_lists import for_one
 from posix_files import folders, links, locks, modes, pipes
 
+from palette4d.colour.ocio_config import config_of_sidecar
 from palette4d.common import files
 from palette4d.common.errors import Palette4dError, WriteError
 from palette4d.common.files import replacing
+from palette4d.media.source_clip import candidates
 
 
 def names(folder: Path) -> list[str]:
@@ -113,17 +117,8 @@ def test_permissions_are_kept(old: Path, mode: int) -> None:
     assert stat.S_IMODE(old.stat().st_mode) == mode
 
 
-def access_list(*entries: tuple[int, int, int]) -> bytes:
-    """An access list as Linux stores it, of (tag, rights, id)."""
-    return struct.pack("<I", 2) + b"".join(struct.pack("<HHI", *entry) for entry in entries)
-
-
-NOBODY = 0xFFFFFFFF
-# Owner rw, user 12345 r, group none, mask r, others none.
-FOR_ONE = access_list(
-    (1, 6, NOBODY), (2, 4, 12345), (4, 0, NOBODY), (16, 4, NOBODY), (32, 0, NOBODY)
-)
-ACL = "system.posix_acl_access"
+FOR_ONE = for_one(6, 4)
+ACL = access_lists.NAME
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs Linux's extended attributes")
@@ -153,6 +148,24 @@ def test_an_access_list_that_cannot_be_copied_gives_its_rights_to_nobody(
     monkeypatch.setattr(os, "setxattr", failing(OSError(errno.ENOTSUP, "none here")))
     replace(old, lambda: None)
     assert stat.S_IMODE(old.stat().st_mode) == 0o600
+
+
+@pytest.mark.skipif(
+    sys.platform != "linux" or os.geteuid() != 0, reason="needs root, and Linux's attributes"
+)
+def test_who_cannot_give_the_group_keeps_the_attributes_and_narrows_the_list(
+    old: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it gave to the old group and to others by name must not go to the new group."""
+    os.chown(old, 12345, 12346)
+    os.setxattr(old, "user.reviewed", b"yes")
+    os.setxattr(old, ACL, FOR_ONE)
+    monkeypatch.setattr(os, "fchown", failing(PermissionError(errno.EPERM, "not you")))
+    replace(old, lambda: None)
+    assert os.getxattr(old, "user.reviewed") == b"yes"
+    assert os.getxattr(old, ACL) == FOR_ONE.replace(
+        struct.pack("<HH", 16, 4), struct.pack("<HH", 16, 0)
+    )
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs root")
@@ -477,3 +490,30 @@ def test_a_pipe_or_device_is_never_replaced(tmp_path: Path) -> None:
             temporary.write_text("x")
     assert pipe.is_fifo()
     assert [each.name for each in tmp_path.iterdir() if each not in (pipe, link)] == []
+
+
+@pytest.mark.parametrize(
+    ("path", "named_in", "other"),
+    [
+        ("\\\\server\\share\\shot.mov", "C:/show/a.p4d.json", True),
+        ("//server/share/shot.mov", "C:/show/a.p4d.json", True),
+        ("\\/server/share/shot.mov", "C:/show/a.p4d.json", True),
+        ("\\\\?\\UNC\\server\\share\\shot.mov", "C:/show/a.p4d.json", True),
+        ("\\\\server\\share\\shot.mov", "//other/share/a.p4d.json", True),
+        ("\\\\SERVER\\share\\shot.mov", "//server/share/a.p4d.json", False),
+        ("C:\\show\\shot.mov", "C:/show/a.p4d.json", False),
+        ("shot.mov", "//server/share/a.p4d.json", False),
+    ],
+)
+def test_windows_asks_no_server_that_only_a_file_names(
+    path: str, named_in: str, other: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It would log in there, with the user's name and a hash of the password."""
+    monkeypatch.setattr(sys, "platform", "win32")
+    monkeypatch.setattr(Path, "absolute", lambda self: PureWindowsPath(str(self)))
+    assert files.names_a_server(path, Path(named_in)) == other
+    if other:
+        assert candidates(Path(named_in), path) == []
+        assert files.names_a_server(path, Path("C:/"))
+        with pytest.raises(Palette4dError, match="the sidecar names"):
+            config_of_sidecar(path, "--ocio-config")

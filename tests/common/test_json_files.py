@@ -44,11 +44,13 @@ def test_what_is_in_texts_does_not_count() -> None:
 def test_what_is_no_regular_file_is_refused_at_once(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    for path in (pipe, Path("/dev/zero")):
+    handles = Path("/proc/self/fd")
+    before = len(list(handles.iterdir())) if handles.exists() else 0
+    for path in (pipe, Path("/dev/zero"), tmp_path):
         with pytest.raises(UnusableFile, match="pipe or device"):
             read_json(path)
-    with pytest.raises(IsADirectoryError):
-        read_json(tmp_path)
+    if before:  # who waits for a lock whose file is a folder looks at it hundreds of times
+        assert len(list(handles.iterdir())) == before
     with pytest.raises(FileNotFoundError):
         read_json(tmp_path / "gone")
 

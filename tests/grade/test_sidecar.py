@@ -3,11 +3,15 @@
 import copy
 import json
 import os
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from confining import forks
 
 from palette4d import Palette4dError, SidecarError, _core
 from palette4d.grade import sidecar
@@ -74,6 +78,48 @@ def test_every_double_survives(tmp_path: Path) -> None:
     read = _core.read_sidecar(tmp_path / "out.p4d.json").polytope.vertices
     expected = np.array([[*v["rgb"], v["frame"]] for v in document["polytope"]["vertices"]])
     assert read.tobytes() == expected.tobytes()
+
+
+# Another program puts the file and a pipe in each other's place. A reader that looks before it
+# opens waits for the pipe's writer, once in some hundred reads; the alarm ends it then.
+READS = """
+import os, signal, sys
+from pathlib import Path
+from palette4d import _core
+from palette4d.common.errors import Palette4dError
+from palette4d.grade import sidecar
+
+os.mkfifo("pipe")
+os.link("a.p4d.json", "file")
+parent = os.getpid()
+swaps = os.fork()
+if swaps == 0:
+    while os.getppid() == parent:
+        for name in ("pipe", "file"):
+            os.link(name, "turn")
+            os.rename("turn", "a.p4d.json")
+signal.alarm(60)
+try:
+    found = [0, 0]
+    for _ in range(3000):
+        for read in (sidecar.read_bytes, _core.read_sidecar):
+            try:
+                read("a.p4d.json")
+            except Palette4dError:
+                found[0] += 1
+            else:
+                found[1] += 1
+    sys.exit(min(found) == 0)
+finally:
+    os.kill(swaps, signal.SIGKILL)
+"""
+
+
+@forks
+def test_a_pipe_that_comes_into_the_files_place_holds_up_no_reader(tmp_path: Path) -> None:
+    shutil.copyfile(GOLDEN / "v1_flat.p4d.json", tmp_path / "a.p4d.json")
+    done = subprocess.run([sys.executable, "-c", READS], cwd=tmp_path, check=False, timeout=120)
+    assert done.returncode == 0
 
 
 def test_what_other_programs_keep_survives_an_edit(tmp_path: Path) -> None:

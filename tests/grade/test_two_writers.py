@@ -3,6 +3,7 @@
 import itertools
 import json
 import os
+import stat
 import subprocess
 import sys
 import time
@@ -175,6 +176,20 @@ def test_a_lock_that_was_taken_away_stops_the_write(tmp_path: Path) -> None:
         with pytest.raises(Palette4dError):
             held()
     assert (tmp_path / ".clip.p4d.json.lock").read_text() == "another 1 abc"
+
+
+@pytest.mark.parametrize("mask", [0, 0o077])
+def test_all_read_who_holds_a_lock_and_its_owner_alone_changes_it(
+    tmp_path: Path, mask: int
+) -> None:
+    """Else who may only read the folder takes it away, or a colleague cannot see that it died."""
+    before = os.umask(mask)
+    try:
+        with locking.locked(tmp_path / "clip.p4d.json"):
+            lock = tmp_path / ".clip.p4d.json.lock"
+            assert stat.S_IMODE(lock.stat().st_mode) == 0o644
+    finally:
+        os.umask(before)
 
 
 @pytest.mark.parametrize("content", ["", "computer 1", "computer 1 0123"])

@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
+#include <fstream>
 
 #include "../../ofx_plugin/node/program_file.hpp"
 #include "harness.hpp"
@@ -10,9 +11,14 @@
 
 #if !defined(_WIN32)
 #include <fcntl.h>
+#include <grp.h>
+#include <pwd.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#endif
+#if defined(__linux__)
+#include <sys/xattr.h>
 #endif
 
 using namespace strict;
@@ -126,6 +132,35 @@ TEST(the_programs_file_is_believed_only_if_it_is_ours) {
             }
         }
     }
+    if (::geteuid() == 0) {  // a group of the user's own name is the user; another is not
+        std::string open = "/tmp/palette4d-XXXXXX";  // where both users may read
+        CHECK(::mkdtemp(open.data()) != nullptr);
+        fs::copy_file(place / "sh", fs::path(open) / "sh");
+        std::ofstream(open + "/program") << open << "/sh\n";
+        for (const auto& [user, group, own] :
+             {std::tuple("daemon", "daemon", true), std::tuple("daemon", "users", false)}) {
+            const passwd* const who = ::getpwnam(user);
+            const struct group* const of = ::getgrnam(group);
+            if (!who || !of) continue;  // a system without these
+            const uid_t id = who->pw_uid;
+            CHECK(::chown(open.c_str(), id, of->gr_gid) == 0 && ::chmod(open.c_str(), 0775) == 0);
+            CHECK(::setegid(of->gr_gid) == 0 && ::seteuid(id) == 0);
+            const std::string problem = read_program(open + "/program").problem;
+            CHECK(::seteuid(0) == 0 && ::setegid(0) == 0);
+            EXPECT(own ? problem.empty() : problem.find("by other users") != std::string::npos,
+                   problem);
+        }
+        fs::remove_all(open);
+    }
+    write("program", (place / "sh").u8string());
+#if defined(__linux__)
+    // Owner, user 12345, group, mask, others: the group's bits of the mode are the mask's.
+    const unsigned short list[] = {2,      0,      1,  7, 0xffff, 0xffff, 2,  7,
+                                   12345,  0,      4,  0, 0xffff, 0xffff, 16, 7,
+                                   0xffff, 0xffff, 32, 5, 0xffff, 0xffff};
+    CHECK(::setxattr(place.c_str(), "system.posix_acl_access", list, sizeof list, 0) == 0);
+    refused("may be changed by other users");
+#endif
     fs::remove_all(place);
     fs::remove(folder() / "link");
     write("program", "/bin");

@@ -11,11 +11,11 @@
 
 using namespace strict;
 using namespace test;
-using palette4d::node::bytes_of;
+using palette4d::bytes_of;
+using palette4d::reachable;
 using palette4d::node::clip_folder;
 using palette4d::node::clip_spec;
 using palette4d::node::expanded;
-using palette4d::node::reachable;
 using palette4d::node::sidecar_beside;
 using palette4d::node::words_of_missing;
 

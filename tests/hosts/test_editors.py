@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
-from posix_files import homes, links
+from posix_files import homes, links, pipes
 
 import palette4d
 from palette4d.cli import main
@@ -108,13 +109,18 @@ def test_replaces_an_earlier_version(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["palette4d.xml", "palette4d/meta.qml", "palette4d/ui.qml"])
-@pytest.mark.parametrize("kind", ["file", pytest.param("dangling link", marks=links)])
+@pytest.mark.parametrize(
+    "kind",
+    ["file", pytest.param("dangling link", marks=links), pytest.param("pipe", marks=pipes)],
+)
 def test_refuses_to_replace_somebody_elses(tmp_path: Path, name: str, kind: str) -> None:
     install = install_kdenlive if name.endswith(".xml") else install_shotcut
     path = tmp_path / name
     path.parent.mkdir(exist_ok=True)
     if kind == "file":
         path.write_text("precious")
+    elif kind == "pipe":  # that nobody writes to
+        os.mkfifo(path)
     else:
         path.symlink_to("gone")
     with pytest.raises(Palette4dError, match="force=True"):
@@ -123,6 +129,8 @@ def test_refuses_to_replace_somebody_elses(tmp_path: Path, name: str, kind: str)
     assert names(tmp_path) == [name]
     if kind == "file":
         assert path.read_text() == "precious"
+    if kind == "pipe":
+        path.unlink()
     install(tmp_path, force=True)
     assert MARK in path.read_text()
 

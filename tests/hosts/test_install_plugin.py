@@ -12,6 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import access_lists
 import pytest
 from posix_files import links, modes
 
@@ -96,7 +97,7 @@ def test_a_closed_umask_makes_no_closed_plugin(bundle: Path, tmp_path: Path) -> 
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs root")
-@pytest.mark.parametrize("how", ["theirs", "open"])
+@pytest.mark.parametrize("how", ["theirs", "open", *(["list"] if sys.platform == "linux" else [])])
 @pytest.mark.parametrize("what", ["package", "library", "link"])
 def test_root_installs_nothing_that_another_user_could_change(
     bundle: Path, tmp_path: Path, what: str, how: str
@@ -109,6 +110,9 @@ def test_root_installs_nothing_that_another_user_could_change(
         given.symlink_to(bundle)
     if how == "theirs":
         os.chown(changed, 12345, 12345)
+    elif how == "list":  # root's own group, but the list names one more
+        changed.chmod(0o775)
+        os.setxattr(changed, access_lists.NAME, access_lists.for_one(7, 7))
     else:
         changed.chmod(0o777)
     with pytest.raises(Palette4dError, match="root"):

@@ -201,8 +201,11 @@ def test_a_worker_with_several_threads_does_one_piece_at_a_time(tmp_path: Path) 
     with farm(tmp_path / "farm", workers=0, PYTHONPATH=path) as made:
         made.add_worker("wide", threads=3)
         found: dict[int, object] = {}
-        tasks = {i: i for i in (1, 2, 3, 6)}
+        tasks = {i: i for i in (1, 2, 3, 6, 7)}
         Workers(cluster=made.address).run(piece, tasks, found.__setitem__)
+    endless = found.pop(7)  # Dask cannot send such an error
+    assert isinstance(endless, Failed)
+    assert "RecursionError" in endless.text
     assert found == {1: (1, 3), 2: (4, 3), 3: Failed("three is refused"), 6: (36, 3)}
 
 

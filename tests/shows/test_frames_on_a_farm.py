@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from edits import movie, sequence
@@ -11,7 +12,8 @@ from farm_processes import farm
 
 from palette4d.cli import main
 from palette4d.common.errors import Palette4dError
-from palette4d.shows.frames import FramesTask, render, render_frames
+from palette4d.jobs import dask_farm
+from palette4d.shows.frames import Files, FramesTask, render, render_frames
 
 EDITED = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_edited.p4d.json"
 
@@ -56,6 +58,25 @@ def test_a_farm_writes_the_same_bytes(
         assert json.loads(said.out)["frames"] == [1, 2, 4, 7]
         assert "2 frames of 6 could not" in said.err
         assert "from frame 5: " in said.err
+
+
+@pytest.mark.parametrize("answered", [(), (11,)])
+def test_a_worker_that_answers_with_other_frames_is_told_of(
+    answered: tuple[int, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are neither left out without a word, nor put in other frames' places."""
+
+    def lied(address: str, work: Any, tasks: Any, take: Any) -> None:
+        for row, task in tasks.items():
+            content = work(task, 1).content.values()
+            take(row, Files(dict(zip(answered, content, strict=False)), (), ()))
+
+    monkeypatch.setattr(dask_farm, "run", lied)
+    clip = str(sequence(tmp_path / "in", "sh", 1, 3))
+    (tmp_path / "o.0011.png").write_text("precious")
+    with pytest.raises(Palette4dError, match="3 frames of 3 could not"):
+        render(EDITED, clip, tmp_path / "o.####.png", frames="1-3", cluster="farm:9")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["in", "o.0011.png"]
 
 
 def test_what_a_farm_cannot_do(tmp_path: Path) -> None:

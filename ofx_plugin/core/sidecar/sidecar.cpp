@@ -3,10 +3,10 @@
 #include "sidecar/sidecar.hpp"
 
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "sidecar/codec.hpp"
+#include "sidecar/file_bytes.hpp"
 #include "sidecar/members.hpp"
 #include "sidecar/schema.hpp"
 
@@ -107,19 +107,11 @@ Sidecar read_sidecar(const std::string& path) {
         throw SidecarError(path, "", "no such file", wanted);
     }
     if (fs::is_directory(status)) throw SidecarError(path, "", "a folder", wanted);
-    // Reading a pipe or device could block the host forever.
     if (!fs::is_regular_file(status)) throw SidecarError(path, "", "no regular file", wanted);
-    std::ifstream stream(native, std::ios::binary);
-    if (!stream) throw SidecarError(path, "", "a file that cannot be opened", wanted);
-    std::string text;
-    std::vector<char> chunk(1 << 16);
-    while (stream.read(chunk.data(), static_cast<std::streamsize>(chunk.size())),
-           stream.gcount() > 0) {
-        text.append(chunk.data(), static_cast<std::size_t>(stream.gcount()));
-        if (text.size() > kMaxSidecarBytes) break;  // the parser refuses it by its size
-    }
-    if (stream.bad()) throw SidecarError(path, "", "a file that cannot be read", wanted);
-    return parse_sidecar(text, path);
+    // One byte more: the parser refuses a large one by its size.
+    const std::optional<std::string> text = bytes_of(native, kMaxSidecarBytes + 1);
+    if (!text) throw SidecarError(path, "", "a file that cannot be read", wanted);
+    return parse_sidecar(*text, path);
 }
 
 }  // namespace palette4d

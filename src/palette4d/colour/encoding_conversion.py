@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from palette4d.colour.ocio_config import load_config, same_encodings, space_of_encoding
+from palette4d.colour.ocio_config import config_of_sidecar, same_encodings, space_of_encoding
 from palette4d.colour.ocio_processor import ExactProcessor
 from palette4d.common.errors import Palette4dError
 
@@ -37,7 +37,7 @@ def between(source: str, target: str, configs: Iterable[str] = ()) -> Convert | 
         return None
     for name in (*configs, NEWEST):
         try:
-            config = load_config(name, "the sidecar's config")
+            config = config_of_sidecar(name, "the sidecar's config")
         except Palette4dError:
             continue  # a config of another computer
         spaces = [space_of_encoding(config, encoding) for encoding in (source, target)]

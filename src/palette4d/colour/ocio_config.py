@@ -11,6 +11,7 @@ from typing import Any
 
 from palette4d.common import sandbox
 from palette4d.common.errors import Arg, Palette4dError
+from palette4d.common.files import names_a_server
 
 #: OpenColorIO's oldest config with camera encodings: every host with 2.1 or later reads it.
 BUILT_IN = "ocio://studio-config-v1.0.0_aces-v1.3_ocio-v2.1"
@@ -139,6 +140,16 @@ def load_config(name: str, option: str) -> Any:
             f"another with {option}"
         ) from error
     return config
+
+
+def config_of_sidecar(name: str, option: str) -> Any:
+    """Return the config that a sidecar names (`load_config`), but none on another server."""
+    if names_a_server(name, Path.cwd()):
+        raise Palette4dError(
+            f"{name}: found a server that the sidecar names, expected a config of this computer; "
+            f"name the config yourself, with {Arg('ocio_config')} or $OCIO"
+        )
+    return load_config(name, option)
 
 
 def from_anywhere(name: str | None) -> str | None:

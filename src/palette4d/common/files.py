@@ -27,7 +27,8 @@ _TEMPORARY = re.compile(r"\..*\.[0-9a-f]{16}\.p4d-tmp(\.[^.]*)?", re.DOTALL)
 #: Seconds after which a temporary file counts as left over where files cannot be locked.
 _LEFT_OVER_AFTER = 86400.0
 _swept: set[Path] = set()
-_ACCESS_LIST = "system.posix_acl_access"
+#: The extended attribute of Linux that holds an access list.
+ACCESS_LIST = "system.posix_acl_access"
 #: As many links on the way to a file as Linux follows.
 _MOST_LINKS = 40
 
@@ -82,6 +83,22 @@ def make_folder(folder: Path) -> None:
 def same_file(a: Path, b: Path) -> bool:
     """Return whether two paths lead to one file."""
     return os.path.realpath(a) == os.path.realpath(b)
+
+
+def names_a_server(path: str, named_in: Path) -> bool:
+    r"""Return whether a path that a file names leads to another server than the file's own.
+
+    To look for ``\\server\share``, Windows logs in there: the server gets the user's name and a
+    hash of the password.
+    """
+    if sys.platform != "win32":
+        return False
+    return _server(path) not in ("", _server(os.fspath(named_in.absolute())))
+
+
+def _server(path: str) -> str:
+    found = re.match(r"[\\/]{2,}([^\\/]*)", path)
+    return "" if found is None else found[1].lower() or "?"
 
 
 def link_target(path: str | os.PathLike[str]) -> Path:
@@ -282,7 +299,7 @@ def _copy_permissions(path: Path, handle: int) -> None:
             os.fchown(handle, owner, group)
     mode = old.st_mode & 0o777
     # With an access list the group's bits are those of the list.
-    if os.fstat(handle).st_gid != old.st_gid or not _copy_attributes(path, handle):
+    if not _copy_attributes(path, handle) or os.fstat(handle).st_gid != old.st_gid:
         mode &= ~0o070 | (mode & 0o007) << 3
     os.fchmod(handle, mode)
 
@@ -294,15 +311,15 @@ def _copy_attributes(path: Path, handle: int) -> bool:
     names: list[str] = []
     with contextlib.suppress(OSError):
         names = os.listxattr(path, follow_symlinks=False)
-    if _ACCESS_LIST not in names:
+    if ACCESS_LIST not in names:
         with contextlib.suppress(OSError):  # what the folder gives to new files
-            os.removexattr(handle, _ACCESS_LIST)
+            os.removexattr(handle, ACCESS_LIST)
     copied = True
     for name in names:
         try:
             os.setxattr(handle, name, os.getxattr(path, name, follow_symlinks=False))
         except OSError:
-            copied = copied and name != _ACCESS_LIST
+            copied = copied and name != ACCESS_LIST
     return copied
 
 

@@ -39,10 +39,13 @@ def read_regular(path: Path, largest: int = LARGEST_FILE) -> bytes:
     """
     # Opening a pipe would block until a program writes into it.
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-    with os.fdopen(handle, "rb") as stream:
+    try:
         if not stat.S_ISREG(os.fstat(handle).st_mode):
             raise UnusableFile(f"{path}: found a folder, pipe or device, expected a file")
-        data = stream.read(largest + 1)
+        with os.fdopen(handle, "rb", closefd=False) as stream:
+            data = stream.read(largest + 1)
+    finally:
+        os.close(handle)
     if len(data) > largest:
         raise UnusableFile(f"{path}: found more than {largest} bytes, expected a smaller file")
     return data

@@ -100,7 +100,7 @@ def remove_left_over(path: Path) -> None:
 
 def _created(path: Path, content: str) -> bool:
     try:
-        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
     except FileExistsError:
         return False
     except PermissionError:
@@ -110,6 +110,9 @@ def _created(path: Path, content: str) -> bool:
     except OSError:
         raise _cannot(path) from None
     try:
+        if sys.platform != "win32":  # whatever the umask: read by all, changed by its owner
+            with contextlib.suppress(OSError):
+                os.fchmod(handle, 0o644)
         os.write(handle, content.encode())
     except OSError:
         with contextlib.suppress(OSError):

@@ -8,6 +8,7 @@ from palette4d._core import __version__
 from palette4d.common import folders
 from palette4d.common.errors import Arg, Palette4dError
 from palette4d.common.files import make_folder, replacing
+from palette4d.common.json_files import UnusableFile, read_regular
 from palette4d.hosts import MARK, kdenlive, shotcut
 
 
@@ -51,7 +52,6 @@ def _write(folder: Path, texts: dict[str, str], force: bool) -> list[Path]:
 def _is_ours(path: Path) -> bool:
     """Whether the first lines of a file say that palette4d wrote it."""
     try:
-        with path.open("rb") as file:
-            return MARK.encode() in file.read(500)
-    except OSError:
+        return MARK.encode() in read_regular(path)[:500]
+    except (OSError, UnusableFile):
         return False

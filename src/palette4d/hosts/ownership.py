@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import stat
 from pathlib import Path
+
+from palette4d.common.files import ACCESS_LIST
 
 
 def changeable(path: Path, owner: int = 0) -> str | None:
@@ -28,10 +31,17 @@ def changeable(path: Path, owner: int = 0) -> str | None:
                 continue
             sticky = stat.S_ISDIR(about.st_mode) and about.st_mode & stat.S_ISVTX
             for_all = about.st_mode & stat.S_IWOTH
-            for_group = about.st_mode & stat.S_IWGRP and about.st_gid != 0
+            # With an access list the group's bits are those of all whom it names.
+            for_group = about.st_mode & stat.S_IWGRP and (about.st_gid != 0 or _has_list(place))
             if (for_all or for_group) and not sticky:
                 return f"{place} may be changed by other users than root"
     return None
+
+
+def _has_list(path: Path) -> bool:
+    with contextlib.suppress(OSError, AttributeError):  # neither has macOS such lists, nor FAT
+        return ACCESS_LIST in os.listxattr(path)
+    return False
 
 
 def runs_as_root() -> bool:

@@ -123,10 +123,16 @@ def _piece(work: Callable[[Task, int], Result], task: Task, config: str | None) 
             if config is not None:
                 os.environ["OCIO"] = config
             return work(task, max(1, get_worker().state.nthreads))
+        except (Palette4dError, OSError):
+            raise
+        except Exception as error:
+            problem = f"{type(error).__name__}: {error}"
         finally:
             os.environ.pop("OCIO", None)
             if before is not None:
                 os.environ["OCIO"] = before
+    # Not the error itself: one that cannot be sent, as of a deep recursion, never arrives.
+    raise Palette4dError(f"the task ended on a worker with {problem}; please report this")
 
 
 def _finished(client: Any, futures: list[Any], address: str) -> Iterator[tuple[Any, Any]]:

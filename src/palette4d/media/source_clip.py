@@ -8,13 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d.common.errors import Palette4dError
+from palette4d.common.files import names_a_server
 from palette4d.media.clip import Clip, open_clip
 from palette4d.media.reading import like_source
 
 
 def candidates(sidecar_path: Path, source: str) -> list[str]:
-    """Possible paths of the stored source: absolute, beside the sidecar, in the working folder."""
-    if not source:
+    """Return possible paths of a source: absolute, beside the sidecar, in the working folder.
+
+    None on a server that only the sidecar names.
+    """
+    if not source or names_a_server(source, sidecar_path):
         return []
     if Path(source).is_absolute():
         return [source]

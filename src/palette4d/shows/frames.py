@@ -163,6 +163,9 @@ def _on_farm(
         if isinstance(answer, Failed):
             failed[row[0]] = answer.text
             return
+        if {*answer.content, *answer.skipped} != set(row):
+            failed[row[0]] = "a worker answered with other frames than it was asked for"
+            return
         for frame, content in answer.content.items():
             path = pattern.path(frame)
             with replacing(path, force=True) as temporary:

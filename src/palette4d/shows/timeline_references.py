@@ -15,7 +15,7 @@ from typing import Any
 
 from palette4d import _core
 from palette4d.common.errors import Arg, Palette4dError
-from palette4d.common.files import refuse_existing, replacing
+from palette4d.common.files import names_a_server, refuse_existing, replacing
 from palette4d.common.json_files import read_regular
 from palette4d.lut_export.series import Series
 from palette4d.shows import timeline_files
@@ -45,7 +45,7 @@ def source_of(manifest: Manifest, manifest_path: Path, argument: str) -> Path:
     source = Path(manifest.source)
     if not source.is_absolute():
         source = manifest_path.absolute().parent / source
-    if not source.exists():
+    if names_a_server(manifest.source, manifest_path) or not source.exists():
         raise Palette4dError(
             f"{source}: the timeline of {manifest_path} is not there; bring it back"
         )

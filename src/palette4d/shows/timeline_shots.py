@@ -18,6 +18,7 @@ from typing import Literal
 from palette4d import _core
 from palette4d.common.child import Child, ChildError
 from palette4d.common.errors import Arg, Palette4dError, in_words
+from palette4d.common.files import names_a_server
 from palette4d.common.text import file_safe
 from palette4d.media import clip_sequence
 from palette4d.media.clip import Clip, open_clip
@@ -167,7 +168,7 @@ class _Finder:
         names += [name for name in (clip.name, clip.reel) if name]
         if named and self.folder is not None and (there := self.folder.find([named])):
             return str(there)
-        if find_media.is_elsewhere(clip.url or ""):
+        if find_media.is_elsewhere(clip.url or "") or names_a_server(named, self.path):
             raise Palette4dError(
                 f"found the media {clip.url!r} of another computer, expected a file of this one; "
                 f"relink it, or name the folder that holds it with {Arg('media')}"

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from palette4d.colour.ocio_config import (
     BUILT_IN,
     SAME_ENCODINGS,
+    config_of_sidecar,
     failures,
     load_config,
     space_of_encoding,
@@ -172,7 +173,7 @@ class Display:
             if name is None or self.known:
                 continue
             try:
-                loaded = load_config(name, option)
+                loaded = (config_of_sidecar if name is config else load_config)(name, option)
             except Palette4dError as error:
                 self.problem = str(error)
                 continue

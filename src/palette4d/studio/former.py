@@ -1,9 +1,11 @@
 """The sidecar as it was before it was analysed again: undo brings it back. It knows no toolkit."""
 
+import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 
 from palette4d.common.files import replacing
+from palette4d.common.json_files import UnusableFile, read_regular
 from palette4d.grade.edits import Edit
 from palette4d.studio import texts
 from palette4d.studio.session import Session
@@ -30,7 +32,9 @@ class Former:
 
     def keep(self, path: Path) -> None:
         """Keep what a file has, before an analysis writes it."""
-        self._now = (path.absolute(), path.read_bytes()) if path.is_file() else None
+        self._now = None
+        with contextlib.suppress(OSError, UnusableFile):
+            self._now = (path.absolute(), read_regular(path))
 
     def written(self, path: Path) -> None:
         """Let undo bring back what the file had; call it when the new one is open."""
@@ -80,7 +84,7 @@ class Former:
         wanted = stack[-1]
         if not self.session.save():
             return
-        data = wanted.path.read_bytes()
+        data = read_regular(wanted.path)
         with replacing(wanted.path, force=True) as temporary:
             temporary.write_bytes(wanted.data)
         stack.pop()

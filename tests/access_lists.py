@@ -1,0 +1,16 @@
+"""Access lists of files, as Linux stores them in an extended attribute."""
+
+import struct
+
+NAME = "system.posix_acl_access"
+#: The id of entries that name nobody.
+NOBODY = 0xFFFFFFFF
+
+
+def for_one(owner: int, rights: int, user: int = 12345) -> bytes:
+    """Return a list: the owner's rights, another user's, none for the group and all others."""
+    entries = (
+        *((1, owner, NOBODY), (2, rights, user), (4, 0, NOBODY)),
+        *((16, rights, NOBODY), (32, 0, NOBODY)),  # at most the rights of the mask
+    )
+    return struct.pack("<I", 2) + b"".join(struct.pack("<HHI", *entry) for entry in entries)
