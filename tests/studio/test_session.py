@@ -233,3 +233,13 @@ def test_edits_that_fail_become_the_status(session: Session) -> None:
     assert session.status.level == "error"
     assert "nowhere" in session.status.text
     assert session.saved
+
+
+def test_a_sidecar_that_is_opened_again_has_the_edits_that_opening_it_saved(sidecar: Path) -> None:
+    session = Session()
+    session.open_sidecar(sidecar)
+    session.edit(lambda document: document.set("v1", rgb=(0.2, 0.3, 0.4)))
+    session.open_sidecar(sidecar)
+    assert session.document is not None
+    assert session.document.grade.settings["v1"].rgb == (0.2, 0.3, 0.4)
+    session.close()

@@ -19,6 +19,7 @@ from typing import TypeVar
 import fileseq  # noqa: F401
 
 from palette4d.common.errors import Palette4dError, in_words
+from palette4d.common.files import same_file
 from palette4d.common.folders import state_folder
 from palette4d.grade import edits, later
 from palette4d.grade.document import Document, OfClip
@@ -101,7 +102,10 @@ class Session(Drafts):
         """
         document = Document.load(path)
         found = find_clip(Path(path), document.grade.core.clip, clip)
+        own = self.path
         self._leave()
+        if own is not None and same_file(own, Path(path)):
+            document = Document.load(path)  # with the edits that were saved just now
         self._document = document
         self._stamp = _stamp(Path(path))
         first, last, step = document.grade.frames
