@@ -2,8 +2,10 @@
 // processor where pocl is installed, and CUDA where there is a GPU. Without either these tests do
 // nothing, and say so.
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <iostream>
 #include <thread>
 
@@ -272,6 +274,76 @@ TEST(gpu_two_contexts_and_sixteen_instances_at_once) {
         }
         for (std::thread& thread : threads) thread.join();
         CHECK(wrong == 0);
+        instances.clear();
+        plugin.unload();
+    }
+}
+
+TEST(gpu_pictures_of_one_pixel_one_row_and_one_column) {
+    for (const auto& gpu : gpus()) {
+        Both node(*gpu);
+        for (const OfxRectI& bounds :
+             {rect(-7, 3, -6, 4), rect(0, 0, 32768, 1), rect(5, 0, 6, 32768)}) {
+            Layout layout;
+            layout.bounds = bounds;
+            node.compare(source_of(layout), bounds, true);
+        }
+    }
+}
+
+TEST(gpu_draws_while_anything_takes_the_sidecars_place) {
+    // Each picture is the edited one or the source, and never a mixture.
+    for (const auto& gpu : gpus()) {
+        Plugin plugin{bundle()};
+        const std::string path = sidecar(), whole = sidecar_text();
+        Layout layout;
+        layout.bounds = rect(0, 0, 64, 40);
+        Picture source(layout);
+        fill(source, 3, false);
+        std::vector<std::unique_ptr<Instance>> instances;
+        for (int i = 0; i < 4; ++i) {
+            instances.push_back(plugin.create());
+            instances.back()->set("sidecar", path);
+            instances.back()->gpu = gpu.get();
+        }
+        Picture drawn(layout);
+        CHECK(instances[0]->render(3, &source, drawn, layout.bounds) == kOfxStatOK);
+        const auto edited = drawn.pixels(layout.bounds), plain = source.pixels(layout.bounds);
+        CHECK(edited != plain);
+        std::atomic<bool> done{false};
+        std::atomic<int> wrong{0}, seen[2] = {};
+        std::vector<std::thread> threads;
+        for (std::size_t t = 0; t < 4; ++t) {
+            threads.emplace_back([&, t] {
+                while (!done) {
+                    Picture output(layout);
+                    const bool ok =
+                        instances[t]->render(3, &source, output, layout.bounds) == kOfxStatOK;
+                    const auto pixels = output.pixels(layout.bounds);
+                    ++(!ok                ? wrong
+                       : pixels == edited ? seen[0]
+                       : pixels == plain  ? seen[1]
+                                          : wrong);
+                }
+            });
+        }
+        const auto began = std::chrono::steady_clock::now();
+        for (int swap = 0; std::chrono::steady_clock::now() - began < std::chrono::seconds(1) ||
+                           ((!seen[0] || !seen[1]) && swap < 10000);
+             ++swap) {
+            std::error_code refused;  // by Windows, while somebody reads the old file
+            std::filesystem::remove_all(path, refused);
+            if (swap % 5 == 1) write("clip.p4d.json", whole.substr(0, 500));
+            if (swap % 5 == 2) write("clip.p4d.json", sidecar_text(false));
+            if (swap % 5 == 3) std::filesystem::create_directory(path, refused);
+            if (swap % 5 == 4) write("clip.p4d.json", whole);
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        }
+        done = true;
+        for (std::thread& thread : threads) thread.join();
+        std::filesystem::remove_all(path);
+        CHECK(wrong == 0);
+        CHECK(seen[0] > 0 && seen[1] > 0);
         instances.clear();
         plugin.unload();
     }
