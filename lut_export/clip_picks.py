@@ -17,7 +17,7 @@ F64 = NDArray[np.float64]
 
 #: `layout.inc` of the kernel: numbers of the head, where it says where picks are and which display
 #: curve, numbers of a pick, and where in it its point and plan begin; numbers of a hold.
-HEAD, PICKS, DISPLAY, PICK, PLAN, HOLD = 28, 14, 17, 25, 13, 8
+HEAD, PICKS, DISPLAY, PICK, PLAN, HOLD = 28, 14, 17, 25, 13, 9
 #: Part of a number of the table, or of 1, by which an interpolated one may differ.
 TOLERANCE = 4e-6
 
@@ -61,7 +61,7 @@ def pick_constants(
     if not mattes:
         return None
     order = sorted(mattes, key=lambda number: mattes[number][0])  # holds last
-    stills, values, bits = _stills([mattes[number][1:] for number in order])
+    stills, values, bits = _stills([mattes[number][1:4] for number in order])
     moments = [edits.pick_moments(time) for time in times]
     if not any(moments):
         return None
@@ -114,7 +114,7 @@ def _row(
             if i is not None:
                 row[start : start + 3] = _node(now[i][1])
                 row[start + 4 : start + 7] = now[i][1]
-                row[start + 7] = now[i][2]
+                row[start + 7 : start + 9] = mattes[number][4], now[i][2]
             row[start + 3] = place
     curve = None
     if table[DISPLAY] > 0:

@@ -140,7 +140,8 @@ py::dict still_mattes(const NamedEdits& self) {
         const py::array_t<float> values(
             {MatteGrid::kSaturations, MatteGrid::kSaturations, MatteGrid::kLightnesses},
             matte.values.data());
-        result[py::int_(i)] = py::make_tuple(pick.hold, values, matte.shares, matte.first);
+        result[py::int_(i)] =
+            py::make_tuple(pick.hold, values, matte.shares, matte.first, matte.learned);
     }
     return result;
 }
@@ -262,7 +263,8 @@ void bind_sidecar(py::module_& module) {
             "The same edits, with mattes of that many values where they were picked; 0: all.")
         .def("still_mattes", &still_mattes,
              "By the number of each enabled pick and hold: whether it is a hold, its matte where "
-             "it was picked, the shares of its 16 lightnesses, and the picked colour's point.")
+             "it was picked, the shares of its 16 lightnesses, the picked colour's point, and "
+             "whether it was learned.")
         .def(
             "pick_moments",
             [](const NamedEdits& self, double frame) {

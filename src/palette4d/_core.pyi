@@ -62,11 +62,11 @@ class Edits:
         """The picks and holds that ask for something at a frame."""
     def with_matte_levels(self, levels: int) -> Edits:
         """The same edits, with mattes of that many values where they were picked; 0: all."""
-    def still_mattes(self) -> dict[int, tuple[bool, F32, list[float], list[float]]]:
+    def still_mattes(self) -> dict[int, tuple[bool, F32, list[float], list[float], bool]]:
         """What the mattes of enabled picks and holds are made from, by their numbers.
 
         Whether it is a hold, its (96, 96, 16) matte where it was picked, the shares of its 16
-        lightnesses, and the picked colour's point.
+        lightnesses, the picked colour's point, and whether it was learned.
         """
     def pick_moments(self, frame: float) -> list[tuple[int, list[float], float]]:
         """Number, point and strength of what asks for something at a frame; picks first."""

@@ -208,10 +208,18 @@ def test_a_frame_of_nothing() -> None:
 
 def test_text_is_a_zlib_stream_of_differences() -> None:
     odds = _core.hue_matte((0.7, 0.2, 0.1))
-    steps = np.frombuffer(zlib.decompress(base64.b64decode(mattes.text_of(odds))), np.uint8)
+    learned, other = (mattes.Learned(each.reshape(-1), True, 0.5) for each in (odds, 126 - odds))
+    steps = np.frombuffer(zlib.decompress(base64.b64decode(learned.text)), np.uint8)
     np.testing.assert_array_equal(np.cumsum(steps, dtype=np.uint8), odds.reshape(-1))
-    assert mattes.id_of(odds) == mattes.id_of(odds.copy())
-    assert mattes.id_of(odds) != mattes.id_of(126 - odds)
+    np.testing.assert_array_equal(mattes.odds_of(learned.text), odds.reshape(-1))
+    assert learned.id == mattes.Learned(learned.odds.copy(), True, 0.5).id != other.id
+
+
+def test_a_colour_of_two_things_is_whose_it_more_certainly_is() -> None:
+    own, other = np.array([100, 80, 63], np.uint8), np.array([40, 90, 120], np.uint8)
+    left = mattes.Learned(own, True, 0.5).against([other])
+    np.testing.assert_array_equal(left.odds, [100, 70, 6])
+    assert mattes.Learned(own, True, 0.5).against([]).odds is own
 
 
 def test_a_learned_matte_is_small(document: Document) -> None:

@@ -406,7 +406,7 @@ def picks_at(document: Document, frame: float) -> Picks:
     if "display" in document.get("mattes", {}):
         display = document["mattes"]["display"]
         curve = display["from"], display["to"], display["values"]
-    holds: list[tuple[F64, float]] = []
+    holds: list[tuple[F64, float, F32 | None]] = []
     left: F32 | None = None
     found: list[Picked] = []
     for kind in ("hold", "pick"):
@@ -420,10 +420,13 @@ def picks_at(document: Document, frame: float) -> Picks:
             if kind == "hold":
                 kept = np.float32(1) - np.float32(strength) * matte
                 left = kept if left is None else left * kept
-                holds.append((point(now), strength))
+                holds.append((point(now), strength, matte if "matte" in pick else None))
                 continue
             spared = np.ones(GRID)
-            for hold, how_much in holds:
+            for hold, how_much, kept in holds:
+                if kept is not None:
+                    spared *= 1 - how_much * kept.astype(float)
+                    continue
                 to_hold, to_pick = apart2(NODES, hold), apart2(NODES, point(now))
                 share = smooth_step(to_hold / np.maximum(to_hold + to_pick, 1e-9), 0, 0.5)
                 spared *= 1 - how_much * (1 - share)

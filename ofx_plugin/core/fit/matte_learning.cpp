@@ -103,18 +103,20 @@ Grid blurred(Grid grid) {
 
 /// What one frame shows.
 struct Densities {
-    Grid object, background, band, part;
+    Grid object, background, band, part, held;
     Densities()
         : object(MatteGrid::kSize, 0.0f),
           background(MatteGrid::kSize, 0.0f),
           band(MatteGrid::kSize, 0.0f),
-          part(MatteGrid::kSize, 0.0f) {}
+          part(MatteGrid::kSize, 0.0f),
+          held(MatteGrid::kSize, 0.0f) {}
 };
 
 void add_frame(Densities& all, const View& view, const Parts& parts, double weight) {
     Histograms histograms(view);
     histograms.add(all.object, weight, parts.object, true);
     histograms.add(all.background, weight, parts.background, true);
+    histograms.add(all.held, weight, parts.held, true);
     const auto count = [](const Mask& mask) {
         return static_cast<double>(std::count(mask.begin(), mask.end(), 1));
     };
@@ -126,23 +128,17 @@ void add_frame(Densities& all, const View& view, const Parts& parts, double weig
     histograms.add(all.part, counts * weight, parts.band, false, &parts.wanted);
 }
 
-/// What holds leave of a pick, and of those of its parts that have a colour of their own.
-Grid held_back(const Vec3& picked, const std::vector<View>& views, const std::vector<Vec3>& holds,
-               const DisplayCurve* display) {
+/// What other colours leave of the object's, by how near a colour is to both.
+Grid shared(const std::vector<Vec3>& own, const std::vector<Vec3>& others) {
     Grid left(MatteGrid::kSize, 1.0f);
-    std::vector<Vec3> parts{pick_point(displayed(picked, display))};
-    for (const View& view : views) {
-        parts.insert(parts.end(), view.areas.begin(), view.areas.end());
-    }
-    for (const Vec3& hold : holds) {
-        const Vec3 held = pick_point(displayed(hold, display));
+    for (const Vec3& other : others) {
         std::size_t at = 0;
         for (int u = 0; u < MatteGrid::kSaturations; ++u) {
             for (int v = 0; v < MatteGrid::kSaturations; ++v) {
                 for (int l = 0; l < MatteGrid::kLightnesses; ++l) {
                     const Vec3 node = MatteGrid::point(u, v, l);
                     double most = 0;
-                    for (const Vec3& part : parts) most = std::max(most, spared(node, held, part));
+                    for (const Vec3& part : own) most = std::max(most, spared(node, other, part));
                     left[at++] *= static_cast<float>(most);
                 }
             }
@@ -159,7 +155,14 @@ LearnedMatte learn_matte(const std::vector<LearningFrame>& frames, const Vec3& p
     std::vector<View> views;
     for (const LearningFrame& frame : frames) views.push_back(reduced(frame, picked, display));
     const Grid hue = hue_grid(displayed(picked, display));
-    const Grid left = held_back(picked, views, holds, display);
+    std::vector<Vec3> own, held, marked;
+    for (const Vec3& hold : holds) held.push_back(pick_point(displayed(hold, display)));
+    for (const View& view : views) {
+        own.insert(own.end(), view.own_points.begin(), view.own_points.end());
+        marked.insert(marked.end(), view.held_points.begin(), view.held_points.end());
+    }
+    // Colours that no frame shows are whose mark is nearer.
+    const Grid left = shared(own, held), unseen = shared(own, marked);
     LearnedMatte learned;
     Grid membership(MatteGrid::kSize), sure;
     for (std::size_t i = 0; i < membership.size(); ++i) membership[i] = hue[i] * left[i];
@@ -183,13 +186,14 @@ LearnedMatte learn_matte(const std::vector<LearningFrame>& frames, const Vec3& p
         }
         const Grid object = blurred(std::move(all.object)),
                    background = blurred(std::move(all.background)),
-                   band = blurred(std::move(all.band)), part = blurred(std::move(all.part));
+                   band = blurred(std::move(all.band)), part = blurred(std::move(all.part)),
+                   held = blurred(std::move(all.held));
         sure.resize(membership.size());
         for (std::size_t i = 0; i < membership.size(); ++i) {
-            const double f = object[i], b = background[i], q = band[i], qm = part[i];
+            const double f = object[i], b = background[i] + held[i], q = band[i], qm = part[i];
             const double prior = std::sqrt(static_cast<double>(hue[i]));
             sure[i] = static_cast<float>(f / (f + b + q + kUnseen));
-            const double m = prior * (f + qm + kUnseen) / (prior * f + q + b + kUnseen);
+            const double m = prior * (f + qm + kUnseen * unseen[i]) / (prior * f + q + b + kUnseen);
             membership[i] = static_cast<float>(std::clamp(m, 0.0, 1.0) * left[i]);
         }
     }

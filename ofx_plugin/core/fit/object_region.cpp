@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
+#include <queue>
 #include <stdexcept>
 #include <utility>
 
@@ -20,6 +23,8 @@ constexpr double kGrows = 0.25;
 constexpr double kPale = 0.35, kPure = 0.65;
 /// At the other frames the object is found where colours are this certainly the object's.
 constexpr double kSure = 0.9;
+/// A step between two pixels is at least this long, in squares of pick space.
+constexpr float kShortest = 1e-6f;
 
 /// 1 where a colour has the pick's saturation or more.
 double purity(const Vec3& shown, const Vec3& picked) {
@@ -75,6 +80,15 @@ void mark(Mask& mask, const View& view, const std::vector<Brush>& areas, double 
             }
         }
     }
+}
+
+/// Where one of several masks is.
+Mask any_of(const std::vector<Mask>& masks, std::size_t size) {
+    Mask any(size, 0);
+    for (const Mask& mask : masks) {
+        for (std::size_t i = 0; i < size; ++i) any[i] |= mask[i];
+    }
+    return any;
 }
 
 /// Areas that casts to pixels and loops over steps can take.
@@ -142,30 +156,24 @@ void grow(const View& view, Mask& marked, Join join_of) {
     });
 }
 
-/// A part of the background takes what has its hue and is nearer its colour than the pick's.
-void grow_other(const View& view, Mask& marked, const Vec3& pick) {
+/// What is held takes what is connected with it, has its hue, and is on its side.
+void grow_held(const View& view, Mask& marked, const Mask& side) {
     grow(view, marked, [&](const Vec3& shown) {
-        return [&view, &pick, own = pick_point(shown), hue = hue_grid(shown)](std::size_t i) {
-            const Vec3& point = view.point[i];
-            const auto away = [&point](const Vec3& from) {
-                const double u = point[0] - from[0], v = point[1] - from[1];
-                return u * u + v * v;
-            };
-            return !view.seed[i] && away(own) < away(pick) &&
-                   MatteGrid::at(hue.data(), point) >= 0.5;
+        return [&view, &side, hue = hue_grid(shown)](std::size_t i) {
+            return !view.seed[i] && side[i] && MatteGrid::at(hue.data(), view.point[i]) >= 0.5;
         };
     });
 }
 
 /// A part of the object that has another colour than the pick takes what has its hue and shade.
-void grow_object(View& view, Mask& marked, const Vec3& pick) {
+void grow_object(View& view, Mask& marked, const Vec3& pick, const Mask& held) {
     grow(view, marked, [&](const Vec3& shown) {
         const Vec3 own = pick_point(shown);
         const bool other = pick_distance2(own, pick) >= kNear * kNear;
-        if (other) view.areas.push_back(own);
-        return [&view, other, shown, amount = PickedColour(shown),
+        if (other) view.own_points.push_back(own);
+        return [&view, &held, other, shown, amount = PickedColour(shown),
                 hue = hue_grid(shown)](std::size_t i) {
-            if (!other || view.other[i]) return false;
+            if (!other || held[i]) return false;
             const Vec3 colour{view.shown[0][i], view.shown[1][i], view.shown[2][i]};
             return amount.amount(colour) > kGrows &&
                    purity(colour, shown) * MatteGrid::at(hue.data(), view.point[i]) >= 0.5;
@@ -298,7 +306,70 @@ Mask connected(const View& view, const Mask& region, const Mask& seeds) {
     return reached;
 }
 
-Parts parts_of(const View& view, Mask region) {
+/// Whether a saturation is nearer to a point of one kind than to all of another.
+bool nearer(const Vec3& point, const std::vector<Vec3>& one, const std::vector<Vec3>& other) {
+    const auto away = [&point](const std::vector<Vec3>& from) {
+        double least = std::numeric_limits<double>::infinity();
+        for (const Vec3& own : from) {
+            const double u = point[0] - own[0], v = point[1] - own[1];
+            least = std::min(least, u * u + v * v);
+        }
+        return least;
+    };
+    return away(one) < away(other);
+}
+
+/// The pixels that are nearer to what is held than to the object, in the frame and in saturation. A
+/// way in the frame is as long as the squares of its steps in pick space: a gradual shade is short,
+/// an edge is long.
+Mask held_side(const View& view, const Mask& object, const Mask& held) {
+    std::array<Image, 3> smooth;
+    for (std::size_t c = 0; c < 3; ++c) {
+        Image plane(view.size());
+        for (std::size_t i = 0; i < view.size(); ++i) {
+            plane[i] = static_cast<float>(view.point[i][c] * (c == 2 ? kLightnessWeight : 1));
+        }
+        smooth[c] = smoothed(view, plane);
+    }
+    Mask side(view.size(), 0), done(view.size(), 0);
+    std::vector<float> length(view.size(), std::numeric_limits<float>::infinity());
+    using Way = std::pair<float, std::size_t>;
+    std::priority_queue<Way, std::vector<Way>, std::greater<>> open;
+    for (std::size_t i = 0; i < view.size(); ++i) {
+        if (!held[i] && !object[i]) continue;
+        side[i] = held[i];
+        length[i] = 0;
+        open.push({0.0f, i});
+    }
+    const auto width = static_cast<std::size_t>(view.width);
+    while (!open.empty()) {
+        const auto [own, i] = open.top();
+        open.pop();
+        if (done[i]) continue;
+        done[i] = 1;
+        const auto visit = [&, from = i, so_far = own](std::size_t to) {
+            float step = kShortest;
+            for (const Image& plane : smooth) {
+                const float change = plane[to] - plane[from];
+                step += change * change;
+            }
+            if (so_far + step >= length[to]) return;
+            length[to] = so_far + step;
+            side[to] = side[from];
+            open.push({length[to], to});
+        };
+        if (i % width > 0) visit(i - 1);
+        if (i % width + 1 < width) visit(i + 1);
+        if (i >= width) visit(i - width);
+        if (i + width < view.size()) visit(i + width);
+    }
+    for (std::size_t i = 0; i < view.size(); ++i) {
+        side[i] &= held[i] || nearer(view.point[i], view.held_points, view.own_points);
+    }
+    return side;
+}
+
+Parts parts_of(const View& view, Mask region, const Mask& other) {
     Parts parts;
     const std::size_t size = view.size();
     const std::vector<int> outside = distances(view, region, 1),
@@ -341,9 +412,9 @@ Parts parts_of(const View& view, Mask region) {
             const bool object =
                 (inside[i] > 1 && !mixed) || (mixed && alpha > 0.9 && region[i]) || view.seed[i];
             const bool others = !object && ((outside[i] > 1 && !mixed) || (mixed && alpha < 0.05));
-            parts.object[i] = object && !view.other[i];
-            parts.background[i] = others || view.other[i];
-            parts.band[i] = mixed && !object && !others && !view.other[i];
+            parts.object[i] = object && !other[i];
+            parts.background[i] = others && !other[i];
+            parts.band[i] = mixed && !object && !others && !other[i];
             alphas[i] = static_cast<float>(alpha);
         }
     }
@@ -357,6 +428,7 @@ Parts parts_of(const View& view, Mask region) {
             std::clamp(static_cast<double>(alphas[i]) * means[i] / own, 0.0, 1.0));
     }
     parts.region = std::move(region);
+    parts.held = other;
     return parts;
 }
 
@@ -380,7 +452,6 @@ View reduced(const LearningFrame& frame, const Vec3& picked, const DisplayCurve*
     view.grows.resize(size);
     view.node.resize(size);
     view.seed.assign(size, 0);
-    view.other.assign(size, 0);
     const Vec3 now = displayed(frame.colour, display), first = displayed(picked, display);
     const Vec3 here = pick_point(now), start = pick_point(first);
     const PickedColour own(now);
@@ -417,20 +488,33 @@ View reduced(const LearningFrame& frame, const Vec3& picked, const DisplayCurve*
     const double scale = 1.0 / by;
     mark(view.seed, view, frame.object, scale);
     for (const Brush& area : frame.others) {
-        Mask marked(size, 0);
-        mark(marked, view, {area}, scale);
-        grow_other(view, marked, start);
-        for (std::size_t i = 0; i < size; ++i) view.other[i] |= marked[i];
+        view.held.emplace_back(size, 0);
+        mark(view.held.back(), view, {area}, scale);
     }
+    const Mask held = any_of(view.held, size);
+    view.own_points.push_back(start);
     for (const Brush& area : frame.object) {
         Mask marked(size, 0);
         mark(marked, view, {area}, scale);
-        grow_object(view, marked, start);
+        grow_object(view, marked, start, held);
         for (std::size_t i = 0; i < size; ++i) view.seed[i] |= marked[i];
     }
     view.seeded = frame.seeded;
     if (frame.seeded && frame.object.empty()) seed_by_colour(view, start);
-    for (std::size_t i = 0; i < size; ++i) view.seed[i] &= view.real[i];
+    for (std::size_t i = 0; i < size; ++i) {
+        view.seed[i] &= view.real[i];
+        for (Mask& marked : view.held) marked[i] &= view.real[i];
+    }
+    for (const Mask& marked : view.held) {
+        Vec3 sum{};
+        double count = 0;
+        for (std::size_t i = 0; i < size; ++i) {
+            if (!marked[i]) continue;
+            add(sum, 1, view.point[i]);
+            count += 1;
+        }
+        if (count > 0) view.held_points.push_back((1 / count) * sum);
+    }
     return view;
 }
 
@@ -454,9 +538,16 @@ Parts find_object(const View& view, const Grid& membership, const Grid& sure) {
     const Image smooth = smoothed(view, inside);
     Mask region(view.size());
     for (std::size_t i = 0; i < view.size(); ++i) {
-        region[i] = view.real[i] && !view.other[i] && (smooth[i] > 0.5f || view.seed[i]);
+        region[i] = view.real[i] && (smooth[i] > 0.5f || view.seed[i]);
     }
-    return parts_of(view, connected(view, region, seeds));
+    std::vector<Mask> held = view.held;
+    if (!held.empty()) {
+        const Mask side = held_side(view, seeds, any_of(held, view.size()));
+        for (std::size_t i = 0; i < view.size(); ++i) region[i] &= !side[i];
+        for (Mask& marked : held) grow_held(view, marked, side);
+    }
+    const Mask other = any_of(held, view.size());
+    return parts_of(view, connected(view, region, seeds), other);
 }
 
 }  // namespace palette4d

@@ -21,8 +21,10 @@ struct View {
     std::vector<Vec3> point;     ///< as if the picked colour were where it was picked
     Mask real;                   ///< has a colour
     Image amount, grows;
-    Mask seed, other;
-    std::vector<Vec3> areas;  ///< points of the object's parts that have another colour
+    Mask seed;               ///< what the user marked as the object's
+    std::vector<Mask> held;  ///< what is held, by area
+    /// Points of the object and its parts of another colour; of what is held.
+    std::vector<Vec3> own_points, held_points;
     bool seeded = false;
     std::vector<std::uint32_t> node;  ///< the nearest node
 
@@ -37,7 +39,7 @@ struct View {
 
 /// Where a frame's object, its background, and mixtures of both are.
 struct Parts {
-    Mask object, background, band;
+    Mask object, background, band, held;
     Image wanted;  ///< of the band: the membership that gives a mixture its part of the change
     Mask region;
 };

@@ -17,6 +17,7 @@ constexpr double kLightnessEnd = 0.1;
 struct Held {
     Vec3 point;
     double strength;
+    FrameMatte matte;  ///< empty: nothing was learned
 };
 
 /// Sets the nodes around a point.
@@ -107,7 +108,9 @@ void hold_back(FrameMatte& matte, const Vec3& pick, const std::vector<Held>& hol
                 const Vec3 node = MatteGrid::point(u, v, l);
                 double left = 1;
                 for (const Held& hold : holds) {
-                    left *= 1 - hold.strength * (1 - spared(node, hold.point, pick));
+                    const double kept = hold.matte.empty() ? 1 - spared(node, hold.point, pick)
+                                                           : static_cast<double>(hold.matte[at]);
+                    left *= 1 - hold.strength * kept;
                 }
                 matte[at] *= static_cast<float>(left);
             }
@@ -145,7 +148,10 @@ FramePick frame_pick(const Moment& moment, const std::vector<Held>& holds, doubl
 
 std::vector<Held> held_at(const std::vector<Moment>& holds) {
     std::vector<Held> held;
-    for (const Moment& hold : holds) held.push_back({hold.point, hold.strength});
+    for (const Moment& hold : holds) {
+        held.push_back({hold.point, hold.strength, {}});
+        if (hold.pick->matte) held.back().matte = baked(*hold.pick, hold.first, hold.point);
+    }
     return held;
 }
 
@@ -188,7 +194,7 @@ FramePicks matte_at(const Edits& edits, const std::string& id, double frame) {
 
 StillMatte still_matte(const Edits& edits, const Pick& pick) {
     return {still_values(pick), lightness_shares(pick),
-            pick_point(displayed(pick.rgb, edits.display.get()))};
+            pick_point(displayed(pick.rgb, edits.display.get())), pick.matte != nullptr};
 }
 
 std::vector<PickMoment> pick_moments(const Edits& edits, double frame) {

@@ -45,6 +45,7 @@ struct StillMatte {
     FrameMatte values;                                  ///< where the colour was picked
     std::array<float, MatteGrid::kLightnesses> shares;  ///< by the range of lightness
     Vec3 first;                                         ///< the picked colour's point
+    bool learned;                                       ///< not that of the hue
 };
 StillMatte still_matte(const Edits& edits, const Pick& pick);
 /// A pick or hold that asks for something at a frame: its number in Edits::picks, its point there

@@ -235,7 +235,7 @@ class _View:
 
     def seeds(self, pick: Pick) -> B:
         """Return the pixels that the user marked in this frame."""
-        marks = [self.mark(area) for area in _marks(pick) if self.has(area)]
+        marks = [self.mark(area) for area in pick.marks if self.has(area)]
         return np.asarray(np.any([np.zeros(self.real.shape, bool), *marks], axis=0))
 
     def thing(self, pick: Pick, taken: B) -> B:
@@ -294,7 +294,15 @@ class _View:
 
 def _unmarked(view: _View, pick: Pick, holds: Sequence[Pick]) -> Iterator[Note]:
     """Report areas that the user marked as the pick's and that it does not take."""
-    for area in _marks(pick):
+    for area in pick.marks:
+        if (strength := pick.strength_at(area.frame, 1.0)) < 0.5:
+            if area.frame != pick.frame:
+                yield Note(
+                    f"{percent(strength)} of the change at frame {area.frame:g}, where you marked "
+                    f"it: its colour was not found there (correct {pick.id})",
+                    warns=True,
+                )
+            continue
         there = _View.of(view.grade, view.clip, area.frame)
         marked = there.mark(area) & there.real
         left = marked & (there.change(pick) < LEAST)
@@ -400,12 +408,6 @@ def _also(view: _View, pick: Pick) -> Iterator[Note]:
             f"this may be more than one thing: look at its matte. A hold on what must stay{less}",
             warns=True,
         )
-
-
-def _marks(pick: Pick) -> list[Area]:
-    """Return the box and the areas of a pick or hold."""
-    box = [] if pick.pixel is None else [Area(pick.frame, (pick.pixel,), (pick.box or 1) / 2)]
-    return [*box, *pick.areas]
 
 
 def _opened(mask: B) -> B:

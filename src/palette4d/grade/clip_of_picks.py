@@ -241,7 +241,7 @@ class ClipOfPicks:
                     f"one. Pick inside of one colour, or give a smaller {Arg('box')}"
                 )
         away = np.linalg.norm(rgb - pick.rgb, axis=1)
-        if away.min() > ALIKE:
+        if pick.pixel is None and away.min() > ALIKE:
             lines.append(
                 f"no pixel of frame {frame} is near the colour of {pick.id}: the nearest one, "
                 f"{hex_of(rgb[away.argmin()])}, is {away.min():.2f} away"

@@ -10,8 +10,8 @@ import base64
 import hashlib
 import zlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,10 +46,35 @@ class Learned:
     are connected with what was clicked on.
     """
 
-    id: str
-    text: str
+    odds: Bytes
     seen: bool
     share: float
+
+    def against(self, others: Sequence[Bytes]) -> Learned:
+        """Return the matte without what is more certainly in others: each lowers it by its lead."""
+        if not others:
+            return self
+        most = np.max(others, axis=0).astype(int)
+        own = self.odds.astype(int)
+        odds = np.clip(own - np.maximum(most - own, 0), 0, None).astype(np.uint8)
+        return replace(self, odds=odds)
+
+    @cached_property
+    def id(self) -> str:
+        """The matte's id: m and 16 digits of a hash of its log odds."""
+        return "m" + hashlib.sha256(self.odds.tobytes()).hexdigest()[:16]
+
+    @cached_property
+    def text(self) -> str:
+        """The matte's text: base64 of a zlib stream of the differences of its log odds."""
+        steps = np.diff(self.odds.reshape(-1), prepend=np.zeros(1, np.uint8))  # modulo 256
+        return base64.b64encode(zlib.compress(steps.tobytes(), 9)).decode()
+
+
+def odds_of(text: str) -> Bytes:
+    """Return the log odds of a matte's text."""
+    steps = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8)
+    return np.cumsum(steps, dtype=np.uint8)
 
 
 def learn(
@@ -63,7 +88,9 @@ def learn(
     chosen = [_nearest(frames, pick.frame)]
     chosen += [_nearest(frames, area.frame) for area in pick.areas]
     seeded = list(dict.fromkeys(chosen))
-    others = [frame for frame in _along(pick, frames) if frame not in seeded]
+    others = [_nearest(frames, area.frame) for hold in holds for area in hold.marks]
+    others += _along(pick, frames)
+    others = [frame for frame in dict.fromkeys(others) if frame not in seeded]
     given = []
     for frame in [*seeded, *others]:
         own = _brushes(pick, frame, frames)
@@ -73,22 +100,19 @@ def learn(
     learned = _core.learn_matte(
         given,
         pick.rgb,
-        holds=[tuple(hold.colour_at(pick.frame).tolist()) for hold in holds],
+        holds=[tuple(hold.colour_at(pick.frame).tolist()) for hold in holds if not hold.marks],
         display=display,
     )
-    odds: Bytes = learned["odds"]
-    return Learned(id_of(odds), text_of(odds), learned["found"], learned["share"])
+    return Learned(learned["odds"].reshape(-1), learned["found"], learned["share"])
 
 
 def _brushes(pick: Pick, frame: int, frames: Sequence[int]) -> list[Brush]:
     """Return the places of a frame that a pick or hold names: points and a radius each."""
-    brushes: list[Brush] = []
-    if pick.pixel is not None and _nearest(frames, pick.frame) == frame:
-        brushes.append(([pick.pixel], (pick.box or 1) / 2))
-    for area in pick.areas:
-        if _nearest(frames, area.frame) == frame:
-            brushes.append((list(area.points), float(area.radius)))
-    return brushes
+    return [
+        (list(area.points), float(area.radius))
+        for area in pick.marks
+        if _nearest(frames, area.frame) == frame
+    ]
 
 
 def _nearest(frames: Sequence[int], frame: float) -> int:
@@ -102,18 +126,6 @@ def _along(pick: Pick, frames: Sequence[int]) -> list[int]:
     inside = [n for n in frames if first <= n <= last and pick.strength_at(n, 1.0) > 0.5]
     count = min(FURTHER_FRAMES, len(inside))
     return [inside[(2 * k + 1) * len(inside) // (2 * count)] for k in range(count)]
-
-
-def id_of(odds: Bytes) -> str:
-    """Return the id of a matte: m and 16 digits of a hash of its log odds."""
-    return "m" + hashlib.sha256(odds.tobytes()).hexdigest()[:16]
-
-
-def text_of(odds: Bytes) -> str:
-    """Return a matte's text: base64 of a zlib stream of the differences of its log odds."""
-    flat = odds.reshape(-1)
-    steps = np.diff(flat, prepend=np.zeros(1, np.uint8))  # modulo 256
-    return base64.b64encode(zlib.compress(steps.tobytes(), 9)).decode()
 
 
 @lru_cache(maxsize=16)

@@ -16,6 +16,7 @@ from palette4d.grade.colour_moves import fades_text, range_text
 from palette4d.grade.edits import Key, as_colour, new_id
 from palette4d.grade.follow import Progress
 from palette4d.grade.grade import Grade
+from palette4d.grade.mattes import Learned, odds_of
 from palette4d.grade.picks import MOST_PICKS, Area, Pick, Toward, check
 
 
@@ -178,19 +179,17 @@ def change_pick(
     if old.enabled != new.enabled:
         label = f"{'enable' if new.enabled else 'disable'} {id}"
     learns = moved or {"pixel", "box", "areas", "whole_hue"} & changes.keys()
-    if learns or follow is not None or (new.kind == "hold" and old.enabled != new.enabled):
+    if learns or follow is not None or old.enabled != new.enabled:
         return _learned(grade, clip, new, label)
     return grade.put("pick", id, new, label)
 
 
 def unpick(grade: Grade, clip: ClipOfPicks, *ids: str) -> Grade:
-    """Remove picks and holds. Without a hold, the others' mattes are learned again."""
-    holds = any(grade.pick(id_).kind == "hold" for id_ in ids)
+    """Remove picks and holds; the mattes of the other kind are learned again."""
+    removed = [grade.pick(id_) for id_ in ids]
     keys: list[Key] = [("pick", id_) for id_ in ids]
     grade = grade.having(dict.fromkeys(keys))
-    if holds:
-        grade = _all_learned(grade, clip)
-    return grade.labelled(f"remove {' '.join(ids)}")
+    return _with_mattes(grade, clip, removed).labelled(f"remove {' '.join(ids)}")
 
 
 def taken(grade: Grade, clip: ClipOfPicks, picks: Iterable[Pick]) -> tuple[Grade, list[str]]:
@@ -198,16 +197,16 @@ def taken(grade: Grade, clip: ClipOfPicks, picks: Iterable[Pick]) -> tuple[Grade
 
     Without the clip they take all of their hue, as they cannot be learned.
     """
-    left_out, there = [], clip.open() is not None
-    # Holds first: they are background for the picks.
-    for pick in sorted(picks, key=lambda pick: pick.kind == "pick"):
+    left_out, moved, there = [], [], clip.open() is not None
+    for pick in picks:
         here = clip.at_home(pick, grade.display()) if there and not pick.whole_hue else pick
         if here is None:
             left_out.append(f"{pick.id} ({_asked(pick)})")
         else:
-            moved = replace(here, path=clip.path(here)) if there else here
-            grade = _with_matte(grade, clip, moved)
-    return grade, left_out
+            moved.append(replace(here, path=clip.path(here)) if there else here)
+    for pick in moved:
+        grade = grade.put("pick", pick.id, pick)
+    return _with_mattes(grade, clip, moved), left_out
 
 
 def warnings(grade: Grade, clip: ClipOfPicks, id: str) -> tuple[str, ...]:
@@ -266,33 +265,36 @@ def _add(
 
 
 def _learned(grade: Grade, clip: ClipOfPicks, pick: Pick, label: str) -> Grade:
-    """Set a pick or hold with a new matte; a hold changes the others' mattes."""
-    grade = _with_matte(grade, clip, pick)
-    if pick.kind == "hold":
-        grade = _all_learned(grade, clip)
-    return grade.labelled(label)
+    """Set a pick or hold with a new matte; picks and holds change each other's mattes."""
+    return _with_mattes(grade.put("pick", pick.id, pick), clip, [pick]).labelled(label)
 
 
-def _all_learned(grade: Grade, clip: ClipOfPicks) -> Grade:
-    """Learn the mattes of all picks again, where the clip is there: their holds changed."""
-    for old in grade.picks:
-        if old.kind == "pick":
-            grade = _with_matte(grade, clip, old)
+def _with_mattes(grade: Grade, clip: ClipOfPicks, changed: Sequence[Pick]) -> Grade:
+    """Learn the mattes of changed picks or holds that are still there, and of the other kind.
+
+    Picks are background for holds, and holds for picks. A colour that both have is whose it more
+    certainly is. What cannot be learned, without the clip, keeps its matte.
+    """
+    ids, kinds = {pick.id for pick in changed}, {pick.kind for pick in changed}
+    again = [pick for pick in grade.picks if pick.id in ids or kinds - {pick.kind}]
+    mattes: dict[str, Learned] = {}
+    for pick in again:
+        rivals = [p for p in grade.picks if p.kind != pick.kind and p.enabled]
+        learned = None if pick.whole_hue else clip.learn(pick, rivals, grade.display())
+        if learned is not None:
+            mattes[pick.id] = learned
+    odds = {p.id: odds_of(grade.mattes[p.matte]) for p in grade.picks if p.matte and p.enabled}
+    odds |= {id_: learned.odds for id_, learned in mattes.items() if grade.pick(id_).enabled}
+    for pick in again:
+        if pick.whole_hue:
+            grade = grade.put("pick", pick.id, replace(pick, matte=None))
+        if pick.id not in mattes:
+            continue
+        rivals = [p for p in grade.picks if p.kind != pick.kind and p.id in odds]
+        matte = mattes[pick.id].against([odds[rival.id] for rival in rivals])
+        grade = grade.with_mattes({matte.id: matte.text})
+        grade = grade.put("pick", pick.id, replace(pick, matte=matte.id if matte.seen else None))
     return grade
-
-
-def _with_matte(grade: Grade, clip: ClipOfPicks, pick: Pick) -> Grade:
-    """Set a pick with the matte of its colour; without the clip it keeps the one it has."""
-    if pick.whole_hue:
-        return grade.put("pick", pick.id, replace(pick, matte=None))
-    others = grade.picks if pick.kind == "pick" else ()
-    holds = [p for p in others if p.kind == "hold" and p.enabled and p.id != pick.id]
-    learned = clip.learn(pick, holds, grade.display())
-    if learned is None:
-        return grade.put("pick", pick.id, pick)
-    matte = learned.id if learned.seen else None
-    known = grade.with_mattes({learned.id: learned.text})
-    return known.put("pick", pick.id, replace(pick, matte=matte))
 
 
 def _same(old: Pick, new: Pick) -> bool:

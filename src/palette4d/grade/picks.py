@@ -154,6 +154,13 @@ class Pick:
         """Return the pick as an entry of a sidecar's ``edits.picks``; defaults are left out."""
         return _fields_of(self)
 
+    @property
+    def marks(self) -> tuple[Area, ...]:
+        """The box and the areas of the clip that were marked."""
+        if self.pixel is None:
+            return self.areas
+        return (Area(self.frame, (self.pixel,), (self.box or 1) / 2), *self.areas)
+
     def colour_at(self, frame: float) -> F64:
         """Return where the colour is at a frame, (3,)."""
         if not self.path:
