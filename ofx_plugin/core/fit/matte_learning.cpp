@@ -155,14 +155,16 @@ LearnedMatte learn_matte(const std::vector<LearningFrame>& frames, const Vec3& p
     std::vector<View> views;
     for (const LearningFrame& frame : frames) views.push_back(reduced(frame, picked, display));
     const Grid hue = hue_grid(displayed(picked, display));
-    std::vector<Vec3> own, held, marked;
-    for (const Vec3& hold : holds) held.push_back(pick_point(displayed(hold, display)));
+    MarkedColours marked;
     for (const View& view : views) {
-        own.insert(own.end(), view.own_points.begin(), view.own_points.end());
-        marked.insert(marked.end(), view.held_points.begin(), view.held_points.end());
+        const auto& [own, held] = view.marked;
+        marked.own.insert(marked.own.end(), own.begin(), own.end());
+        marked.held.insert(marked.held.end(), held.begin(), held.end());
     }
+    std::vector<Vec3> held;
+    for (const Vec3& hold : holds) held.push_back(pick_point(displayed(hold, display)));
     // Colours that no frame shows are whose mark is nearer.
-    const Grid left = shared(own, held), unseen = shared(own, marked);
+    const Grid left = shared(marked.own, held), unseen = shared(marked.own, marked.held);
     LearnedMatte learned;
     Grid membership(MatteGrid::kSize), sure;
     for (std::size_t i = 0; i < membership.size(); ++i) membership[i] = hue[i] * left[i];
@@ -174,7 +176,7 @@ LearnedMatte learn_matte(const std::vector<LearningFrame>& frames, const Vec3& p
         for (std::size_t n = 0; n < views.size(); ++n) {
             const View& view = views[n];
             if (!view.seeded && round == 0) continue;
-            const Parts parts = find_object(view, membership, sure);
+            const Parts parts = find_object(view, membership, sure, marked);
             // What was clicked on counts as much as all other frames together.
             const double others = static_cast<double>(count) - 1;
             add_frame(all, view, parts, n > 0 ? 0.5 / others : others > 0 ? 0.5 : 1.0);

@@ -170,7 +170,7 @@ void grow_object(View& view, Mask& marked, const Vec3& pick, const Mask& held) {
     grow(view, marked, [&](const Vec3& shown) {
         const Vec3 own = pick_point(shown);
         const bool other = pick_distance2(own, pick) >= kNear * kNear;
-        if (other) view.own_points.push_back(own);
+        if (other) view.marked.own.push_back(own);
         return [&view, &held, other, shown, amount = PickedColour(shown),
                 hue = hue_grid(shown)](std::size_t i) {
             if (!other || held[i]) return false;
@@ -322,7 +322,8 @@ bool nearer(const Vec3& point, const std::vector<Vec3>& one, const std::vector<V
 /// The pixels that are nearer to what is held than to the object, in the frame and in saturation. A
 /// way in the frame is as long as the squares of its steps in pick space: a gradual shade is short,
 /// an edge is long.
-Mask held_side(const View& view, const Mask& object, const Mask& held) {
+Mask held_side(const View& view, const Mask& object, const Mask& held,
+               const MarkedColours& marked) {
     std::array<Image, 3> smooth;
     for (std::size_t c = 0; c < 3; ++c) {
         Image plane(view.size());
@@ -364,12 +365,12 @@ Mask held_side(const View& view, const Mask& object, const Mask& held) {
         if (i + width < view.size()) visit(i + width);
     }
     for (std::size_t i = 0; i < view.size(); ++i) {
-        side[i] &= held[i] || nearer(view.point[i], view.held_points, view.own_points);
+        side[i] &= held[i] || nearer(view.point[i], marked.held, marked.own);
     }
     return side;
 }
 
-Parts parts_of(const View& view, Mask region, const Mask& other) {
+Parts parts_of(const View& view, Mask region, const Mask& other, const Mask& unsure) {
     Parts parts;
     const std::size_t size = view.size();
     const std::vector<int> outside = distances(view, region, 1),
@@ -413,8 +414,8 @@ Parts parts_of(const View& view, Mask region, const Mask& other) {
                 (inside[i] > 1 && !mixed) || (mixed && alpha > 0.9 && region[i]) || view.seed[i];
             const bool others = !object && ((outside[i] > 1 && !mixed) || (mixed && alpha < 0.05));
             parts.object[i] = object && !other[i];
-            parts.background[i] = others && !other[i];
-            parts.band[i] = mixed && !object && !others && !other[i];
+            parts.background[i] = others && !other[i] && !unsure[i];
+            parts.band[i] = mixed && !object && !others && !other[i] && !unsure[i];
             alphas[i] = static_cast<float>(alpha);
         }
     }
@@ -492,7 +493,7 @@ View reduced(const LearningFrame& frame, const Vec3& picked, const DisplayCurve*
         mark(view.held.back(), view, {area}, scale);
     }
     const Mask held = any_of(view.held, size);
-    view.own_points.push_back(start);
+    view.marked.own.push_back(start);
     for (const Brush& area : frame.object) {
         Mask marked(size, 0);
         mark(marked, view, {area}, scale);
@@ -513,12 +514,13 @@ View reduced(const LearningFrame& frame, const Vec3& picked, const DisplayCurve*
             add(sum, 1, view.point[i]);
             count += 1;
         }
-        if (count > 0) view.held_points.push_back((1 / count) * sum);
+        if (count > 0) view.marked.held.push_back((1 / count) * sum);
     }
     return view;
 }
 
-Parts find_object(const View& view, const Grid& membership, const Grid& sure) {
+Parts find_object(const View& view, const Grid& membership, const Grid& sure,
+                  const MarkedColours& marked) {
     Image inside(view.size());
     Mask seeds = view.seed;
     for (std::size_t i = 0; i < view.size(); ++i) {
@@ -541,13 +543,21 @@ Parts find_object(const View& view, const Grid& membership, const Grid& sure) {
         region[i] = view.real[i] && (smooth[i] > 0.5f || view.seed[i]);
     }
     std::vector<Mask> held = view.held;
+    Mask unsure(view.size(), 0);
     if (!held.empty()) {
-        const Mask side = held_side(view, seeds, any_of(held, view.size()));
+        const Mask side = held_side(view, seeds, any_of(held, view.size()), marked);
         for (std::size_t i = 0; i < view.size(); ++i) region[i] &= !side[i];
-        for (Mask& marked : held) grow_held(view, marked, side);
+        for (Mask& area : held) grow_held(view, area, side);
+    } else if (!marked.held.empty()) {
+        // Only the colour says what is held: not enough to call it background.
+        for (std::size_t i = 0; i < view.size(); ++i) {
+            unsure[i] =
+                region[i] && !view.seed[i] && nearer(view.point[i], marked.held, marked.own);
+            region[i] &= !unsure[i];
+        }
     }
     const Mask other = any_of(held, view.size());
-    return parts_of(view, connected(view, region, seeds), other);
+    return parts_of(view, connected(view, region, seeds), other, unsure);
 }
 
 }  // namespace palette4d

@@ -14,6 +14,12 @@ using Grid = std::vector<float>;
 using Mask = std::vector<std::uint8_t>;
 using Image = std::vector<float>;
 
+/// Points of what was marked in all frames: of the object and its parts of another colour, and of
+/// what is held.
+struct MarkedColours {
+    std::vector<Vec3> own, held;
+};
+
 /// A frame, reduced; one element a pixel.
 struct View {
     int width = 0, height = 0;
@@ -23,8 +29,7 @@ struct View {
     Image amount, grows;
     Mask seed;               ///< what the user marked as the object's
     std::vector<Mask> held;  ///< what is held, by area
-    /// Points of the object and its parts of another colour; of what is held.
-    std::vector<Vec3> own_points, held_points;
+    MarkedColours marked;    ///< in this frame
     bool seeded = false;
     std::vector<std::uint32_t> node;  ///< the nearest node
 
@@ -49,6 +54,7 @@ View reduced(const LearningFrame& frame, const Vec3& picked, const DisplayCurve*
 
 /// The object is what is connected with what was clicked on. Where nothing was, it begins at
 /// colours that are the object's by `membership` and, by `sure`, in other frames.
-Parts find_object(const View& view, const Grid& membership, const Grid& sure);
+Parts find_object(const View& view, const Grid& membership, const Grid& sure,
+                  const MarkedColours& marked);
 
 }  // namespace palette4d
