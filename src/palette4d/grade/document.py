@@ -374,7 +374,7 @@ class Document:
         return self.grade.pick(id)
 
     def unpick(self, *ids: str, clip: OfClip | None = None) -> None:
-        """Remove picks and holds. Without a hold, the others' mattes are learned again."""
+        """Remove picks and holds; the mattes of the other kind are learned again."""
         self._take(pick_edits.unpick(self.grade, self._clip(clip), *ids))
 
     def answer(self, id: str, clip: OfClip | None = None) -> answer.Answer | None:
