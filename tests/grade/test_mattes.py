@@ -218,7 +218,7 @@ def test_text_is_a_zlib_stream_of_differences() -> None:
 def test_a_colour_of_two_things_is_whose_it_more_certainly_is() -> None:
     own, other = np.array([100, 80, 63], np.uint8), np.array([40, 90, 120], np.uint8)
     left = mattes.Learned(own, True, 0.5).against([other])
-    np.testing.assert_array_equal(left.odds, [100, 70, 6])
+    np.testing.assert_array_equal(left.odds, [100, 40, 0])
     assert mattes.Learned(own, True, 0.5).against([]).odds is own
 
 

@@ -32,6 +32,9 @@ ReadFrame = Callable[[int], F32]
 #: Number of further frames along the pick's path that a matte is learned from, for colours which
 #: come later. More cost a read of a frame each, and change little.
 FURTHER_FRAMES = 3
+#: How much of a thing's log odds another thing's lead takes away. Larger: edges between two things
+#: are harder; smaller: colours that both may have change by half.
+DECIDES = 4
 #: Samples of a display curve: straight lines between them are within 1/255 of it.
 SAMPLES = 1024
 #: The brightest scene-linear code value that a curve tells from others.
@@ -51,12 +54,12 @@ class Learned:
     share: float
 
     def against(self, others: Sequence[Bytes]) -> Learned:
-        """Return the matte without what is more certainly in others: each lowers it by its lead."""
+        """Return the matte without what is more certainly in others."""
         if not others:
             return self
         most = np.max(others, axis=0).astype(int)
         own = self.odds.astype(int)
-        odds = np.clip(own - np.maximum(most - own, 0), 0, None).astype(np.uint8)
+        odds = np.clip(own - DECIDES * np.maximum(most - own, 0), 0, None).astype(np.uint8)
         return replace(self, odds=odds)
 
     @cached_property
