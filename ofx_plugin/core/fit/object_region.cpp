@@ -8,6 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "fit/region_pixels.hpp"
+
 namespace palette4d {
 namespace {
 
@@ -119,23 +121,6 @@ void seed_by_colour(View& view, const Vec3& point) {
     for (const auto& [unused, i] : away) view.seed[i] = 1;
 }
 
-/// Spreads from the pixels in `open` to neighbours that join(pixel) takes.
-template <class Join>
-void spread(const View& view, std::vector<std::size_t> open, Join join) {
-    const auto width = static_cast<std::size_t>(view.width);
-    const auto visit = [&](std::size_t i) {
-        if (join(i)) open.push_back(i);
-    };
-    while (!open.empty()) {
-        const std::size_t i = open.back();
-        open.pop_back();
-        if (i % width > 0) visit(i - 1);
-        if (i % width + 1 < width) visit(i + 1);
-        if (i >= width) visit(i - width);
-        if (i + width < view.size()) visit(i + width);
-    }
-}
-
 /// Adds to marked pixels those that are connected with them and join(pixel, mean marked colour)
 /// takes.
 template <class Join>
@@ -179,131 +164,6 @@ void grow_object(View& view, Mask& marked, const Vec3& pick, const Mask& held) {
                    purity(colour, shown) * MatteGrid::at(hue.data(), view.point[i]) >= 0.5;
         };
     });
-}
-
-/// Means over squares of half width `radius`, of the pixels in a mask. From sums over all pixels
-/// above and to the left, so that a mean takes the same time for any radius.
-class LocalMean {
-public:
-    LocalMean(const View& view, const Mask& mask, int radius)
-        : view_(view), mask_(mask), radius_(radius), counts_(sums(nullptr)) {}
-
-    /// The means at the `wanted` pixels; 0 at others.
-    Image of(const Image& image, const Mask& wanted) const {
-        const std::vector<double> values = sums(&image);
-        Image means(view_.size(), 0);
-        for (int y = 0; y < view_.height; ++y) {
-            for (int x = 0; x < view_.width; ++x) {
-                if (!wanted[view_.at(x, y)]) continue;
-                const double count = window(counts_, x, y);
-                means[view_.at(x, y)] =
-                    static_cast<float>(count > 0 ? window(values, x, y) / count : 0.0);
-            }
-        }
-        return means;
-    }
-    bool any(int x, int y) const { return window(counts_, x, y) > 0; }
-
-private:
-    std::vector<double> sums(const Image* image) const {
-        const auto stride = static_cast<std::size_t>(view_.width) + 1;
-        std::vector<double> table(stride * (static_cast<std::size_t>(view_.height) + 1), 0.0);
-        for (int y = 0; y < view_.height; ++y) {
-            double row = 0;
-            for (int x = 0; x < view_.width; ++x) {
-                const std::size_t i = view_.at(x, y);
-                if (mask_[i]) row += image ? static_cast<double>((*image)[i]) : 1.0;
-                const std::size_t at =
-                    (static_cast<std::size_t>(y) + 1) * stride + static_cast<std::size_t>(x) + 1;
-                table[at] = table[at - stride] + row;
-            }
-        }
-        return table;
-    }
-    double window(const std::vector<double>& table, int x, int y) const {
-        const auto stride = static_cast<std::size_t>(view_.width) + 1;
-        const auto x1 = static_cast<std::size_t>(std::max(0, x - radius_)),
-                   x2 = static_cast<std::size_t>(std::min(view_.width, x + radius_ + 1));
-        const auto y1 = static_cast<std::size_t>(std::max(0, y - radius_)),
-                   y2 = static_cast<std::size_t>(std::min(view_.height, y + radius_ + 1));
-        return table[y2 * stride + x2] - table[y1 * stride + x2] - table[y2 * stride + x1] +
-               table[y1 * stride + x1];
-    }
-
-    const View& view_;
-    const Mask& mask_;
-    const int radius_;
-    const std::vector<double> counts_;
-};
-
-/// City-block distances to the nearest pixel whose mask is `value`; beyond the frame there is none.
-std::vector<int> distances(const View& view, const Mask& mask, std::uint8_t value) {
-    const int far = view.width + view.height;
-    std::vector<int> away(view.size());
-    for (std::size_t i = 0; i < away.size(); ++i) away[i] = mask[i] == value ? 0 : far;
-    for (int y = 0; y < view.height; ++y) {
-        for (int x = 0; x < view.width; ++x) {
-            int& own = away[view.at(x, y)];
-            if (x > 0) own = std::min(own, away[view.at(x - 1, y)] + 1);
-            if (y > 0) own = std::min(own, away[view.at(x, y - 1)] + 1);
-        }
-    }
-    for (int y = view.height - 1; y >= 0; --y) {
-        for (int x = view.width - 1; x >= 0; --x) {
-            int& own = away[view.at(x, y)];
-            if (x + 1 < view.width) own = std::min(own, away[view.at(x + 1, y)] + 1);
-            if (y + 1 < view.height) own = std::min(own, away[view.at(x, y + 1)] + 1);
-        }
-    }
-    return away;
-}
-
-/// A little smoother, so that single noisy pixels neither join nor part regions.
-Image smoothed(const View& view, const Image& image) {
-    constexpr double kSigma = 1.5;
-    constexpr int kRadius = 5;
-    float kernel[2 * kRadius + 1];
-    double sum = 0;
-    for (int i = -kRadius; i <= kRadius; ++i) sum += std::exp(-0.5 * i * i / (kSigma * kSigma));
-    for (int i = -kRadius; i <= kRadius; ++i) {
-        kernel[i + kRadius] = static_cast<float>(std::exp(-0.5 * i * i / (kSigma * kSigma)) / sum);
-    }
-    const auto blurred = [&](const Image& from, bool along_rows) {
-        Image to(view.size());
-        for (int y = 0; y < view.height; ++y) {
-            for (int x = 0; x < view.width; ++x) {
-                float value = 0;
-                for (int i = -kRadius; i <= kRadius; ++i) {
-                    value += kernel[i + kRadius] *
-                             from[along_rows ? view.at(std::clamp(x + i, 0, view.width - 1), y)
-                                             : view.at(x, std::clamp(y + i, 0, view.height - 1))];
-                }
-                to[view.at(x, y)] = value;
-            }
-        }
-        return to;
-    };
-    return blurred(blurred(image, true), false);
-}
-
-/// The pixels of a region that are connected with seeds, across gaps of one or two pixels.
-Mask connected(const View& view, const Mask& region, const Mask& seeds) {
-    const std::vector<int> away = distances(view, region, 1);
-    Mask reached(view.size(), 0);
-    std::vector<std::size_t> open;
-    for (std::size_t i = 0; i < view.size(); ++i) {
-        if (seeds[i] && away[i] <= 1) {
-            reached[i] = 1;
-            open.push_back(i);
-        }
-    }
-    spread(view, std::move(open), [&](std::size_t i) {
-        if (reached[i] || away[i] > 1) return false;
-        reached[i] = 1;
-        return true;
-    });
-    for (std::size_t i = 0; i < view.size(); ++i) reached[i] &= region[i];
-    return reached;
 }
 
 /// Whether a saturation is nearer to a point of one kind than to all of another.
