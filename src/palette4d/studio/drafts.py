@@ -9,7 +9,7 @@ from abc import abstractmethod
 from palette4d import _core
 from palette4d.grade.document import Document
 from palette4d.grade.later import Unread
-from palette4d.grade.mattes import Learned
+from palette4d.grade.mattes import Learned, odds_of
 from palette4d.grade.picks import Pick
 from palette4d.studio.newest import Newest
 from palette4d.studio.session_view import SessionView
@@ -91,8 +91,10 @@ class Drafts(SessionView):
         if found is None or found[0] is not place:
             return Unread(place.colour)
         _, document, made = found
-        text = document.grade.mattes.get(made.matte or "", "")
-        return Unread(place.colour, Learned(made.matte or "", text, made.matte is not None, 0.0))
+        if made.matte is None:
+            return Unread(place.colour)
+        odds = odds_of(document.grade.mattes[made.matte])
+        return Unread(place.colour, Learned(odds, True, 0.0))
 
     def _failed(self, place: Place, error: Exception) -> None:
         if self.place is place:
