@@ -5,7 +5,6 @@ writes their text.
 """
 
 import os
-import stat
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Literal
@@ -13,7 +12,7 @@ from typing import Any, Literal
 from palette4d import _core
 from palette4d.common.errors import Arg, Palette4dError, SidecarError
 from palette4d.common.files import link_target, refuse_existing, replacing
-from palette4d.common.json_files import LARGEST_FILE
+from palette4d.common.json_files import UnusableFile, read_regular
 from palette4d.common.locking import locked
 from palette4d.common.text import counted
 from palette4d.grade.members import Fields, edits_fields, edits_from
@@ -72,14 +71,11 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
             "a .p4d.json file, which `palette4d analyze CLIP -o OUT.p4d.json` writes",
         )
     try:
-        # Opening a pipe would block until a program writes into it.
-        if stat.S_ISREG(Path(path).stat().st_mode):
-            with Path(path).open("rb") as stream:
-                return stream.read(LARGEST_FILE + 1)
+        return read_regular(Path(path))
+    except UnusableFile:
+        reason = "no regular file, or too large"
     except OSError as error:
-        reason = error.strerror
-    else:
-        reason = "it is not a regular file"
+        reason = str(error.strerror)
     _core.read_sidecar(path)  # raises the error that names the kind of file
     raise SidecarError(os.fspath(path), "", f"an unreadable file ({reason})", "a sidecar file")
 
