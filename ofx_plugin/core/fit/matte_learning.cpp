@@ -161,10 +161,10 @@ LearnedMatte learn_matte(const std::vector<LearningFrame>& frames, const Vec3& p
         marked.own.insert(marked.own.end(), own.begin(), own.end());
         marked.held.insert(marked.held.end(), held.begin(), held.end());
     }
-    std::vector<Vec3> held;
-    for (const Vec3& hold : holds) held.push_back(pick_point(displayed(hold, display)));
+    std::vector<Vec3> kept;
+    for (const Vec3& hold : holds) kept.push_back(pick_point(displayed(hold, display)));
     // Colours that no frame shows are whose mark is nearer.
-    const Grid left = shared(marked.own, held), unseen = shared(marked.own, marked.held);
+    const Grid left = shared(marked.own, kept), unseen = shared(marked.own, marked.held);
     LearnedMatte learned;
     Grid membership(MatteGrid::kSize), sure;
     for (std::size_t i = 0; i < membership.size(); ++i) membership[i] = hue[i] * left[i];
