@@ -93,6 +93,21 @@ def test_edits_are_not_lost(clip, tmp_path, capsys):
     assert json.loads(out.read_text())["edits"] == {"vertices": [], "stops": []}
 
 
+def test_a_pick_stays_where_it_was_picked_in_the_clip(clip, tmp_path):
+    """Its colour lies in single pixels, as of a thing that is small or untagged."""
+    out = tmp_path / "shot.p4d.json"
+    assert main.main(["analyze", str(clip), "-o", str(out), *STATIC]) == 0
+    edit = ["edit", str(out), "pick", "--frame", "1003", "--pixel", "5,4", "--to", "#305090"]
+    assert main.main(edit) == 0
+    (before,) = json.loads(out.read_text())["edits"]["picks"]
+    again = ["analyze", str(clip), "-o", str(out), "--quiet", "--keep-edits"]
+    assert main.main([*again, "--frames", "1001-1006"]) == 0
+    (after,) = json.loads(out.read_text())["edits"]["picks"]
+    for name in ("frame", "pixel", "box", "rgb", "to"):
+        assert after[name] == before[name]
+    assert "matte" in after
+
+
 def test_no_picture_is_replaced_by_a_sidecar(clip, tmp_path, capsys):
     frame = clip / "shot.1001.png"
     before = frame.read_bytes()

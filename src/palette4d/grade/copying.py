@@ -121,6 +121,13 @@ class Match:
         return between(own, other, configs), between(other, own, configs)
 
     @property
+    def same_clip(self) -> bool:
+        """Whether both are palettes of one clip: places in it stay where they are."""
+        clip, other = (grade.members["clip"] for grade in (self.target, self.source))
+        names = ("source", "size", "frames")
+        return self.time == "relative" and all(clip[name] == other[name] for name in names)
+
+    @property
     def pace(self) -> float:
         """Frames of the target for one frame of the source."""
         return self.back(1.0) - self.back(0.0)
@@ -263,8 +270,9 @@ def _pick(match: Match, pick: Pick) -> Pick | None:
         first, _, step = match.target.frames
         return first + step * round((match.back(frame) - first) / step)
 
-    # Places, paths and mattes are the other clip's.
-    copy = replace(pick, pixel=None, box=None, areas=(), path=(), matte=None)
+    copy = replace(pick, path=(), matte=None)
+    if not match.same_clip:
+        copy = replace(copy, pixel=None, box=None, areas=())
     copy = replace(copy, start=None, until=None, fade=0.0, fade_out=None)
     if pick.to is not None:
         copy = replace(copy, to=colour(pick.to))

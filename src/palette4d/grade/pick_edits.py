@@ -193,13 +193,18 @@ def unpick(grade: Grade, clip: ClipOfPicks, *ids: str) -> Grade:
 
 
 def taken(grade: Grade, clip: ClipOfPicks, picks: Iterable[Pick]) -> tuple[Grade, list[str]]:
-    """Take over picks of another clip, learned here; return also those whose colour is not here.
+    """Take over picks of another palette, learned here; return also those whose colour is not here.
 
+    Those with a place in this clip are picked there; of others the colour is looked for.
     Without the clip they take all of their hue, as they cannot be learned.
     """
     left_out, moved, there = [], [], clip.open() is not None
     for pick in picks:
-        here = clip.at_home(pick, grade.display()) if there and not pick.whole_hue else pick
+        here: Pick | None = pick
+        if there and pick.pixel is not None:
+            here = replace(pick, rgb=clip.colour(pick.frame, pick.pixel, pick.box or 1))
+        elif there and not pick.whole_hue:
+            here = clip.at_home(pick, grade.display())
         if here is None:
             left_out.append(f"{pick.id} ({_asked(pick)})")
         else:
