@@ -211,7 +211,9 @@ def bake(
     chosen = UNSHAPED
     if not format_.is_cdl:
         seen = found_space.to_palette(image) if in_palette and image is not None else image
-        chosen = _choose_shaper(settings, format_, palette, seen)
+        encoding = viewing_of(sidecar.clip["encoding"]).encoding
+        plain = format_.name == "resolve_cube" and encoding in ("", "sdr-video")
+        chosen = _choose_shaper(settings, format_, palette, seen, plain)
     job = Job(
         sidecar=sidecar,
         sha256=hashlib.sha256(data).hexdigest(),
@@ -330,13 +332,18 @@ def _picture(
 
 
 def _choose_shaper(
-    settings: BakeSettings, format_: LutFormat, palette: NDArray[Any], image: F32 | None
+    settings: BakeSettings,
+    format_: LutFormat,
+    palette: NDArray[Any],
+    image: F32 | None,
+    plain: bool,
 ) -> Shaper:
     """Return the shaper for the settings and the colours.
 
     The frame's colours decide whether the LUT needs a shaper; without a frame, the palette decides.
     The shaper also covers the palette, so that all LUTs of a clip are similar. `palette` holds the
-    (n, 3) colours of the whole palette, in the colour space of `image`.
+    (n, 3) colours of the whole palette, in the colour space of `image`. A `plain` LUT has no
+    linear one unless it is asked for: few programs that take a .cube of a display's colours read it.
     """
     if settings.domain is not None:
         kind: Kind = "log" if settings.shaper == "auto" else settings.shaper
@@ -351,7 +358,9 @@ def _choose_shaper(
         else:
             low, high = min(low, float(finite.min())), max(high, float(finite.max()))
     most = shapers.LARGEST
-    return shapers.choose(settings.shaper, max(low, -most), min(high, most))
+    chosen = shapers.choose(settings.shaper, max(low, -most), min(high, most))
+    alone = plain and settings.shaper == "auto" and chosen.kind == "linear"
+    return UNSHAPED if alone else chosen
 
 
 def nearer(size: int | None) -> str:

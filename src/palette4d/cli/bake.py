@@ -164,7 +164,7 @@ def warnings(result: BakeResult, format_: LutFormat) -> Iterator[str]:
         if shaper.kind != "none":
             help_ = f"widen it with {Arg('domain')}"
         elif format_.shaper:
-            help_ = f"{Arg('shaper', 'auto')} covers them"
+            help_ = f"{Arg('shaper', 'linear')} covers them"
         else:
             help_ = f"{with_shaper()} can hold a shaper that covers them"
         what = f"the palette, from {low:g} to {high:g}, is partly"
