@@ -343,7 +343,7 @@ def _choose_shaper(
     The frame's colours decide whether the LUT needs a shaper; without a frame, the palette decides.
     The shaper also covers the palette, so that all LUTs of a clip are similar. `palette` holds the
     (n, 3) colours of the whole palette, in the colour space of `image`. A `plain` LUT has no
-    linear one unless it is asked for: few programs that take a .cube of a display's colours read it.
+    linear one unless it is asked for: few programs that take a .cube for a display read it.
     """
     if settings.domain is not None:
         kind: Kind = "log" if settings.shaper == "auto" else settings.shaper
