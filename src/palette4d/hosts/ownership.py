@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import stat
+import sys
 from pathlib import Path
 
 from palette4d.common.files import ACCESS_LIST
@@ -39,8 +40,9 @@ def changeable(path: Path, owner: int = 0) -> str | None:
 
 
 def _has_list(path: Path) -> bool:
-    with contextlib.suppress(OSError, AttributeError):  # neither has macOS such lists, nor FAT
-        return ACCESS_LIST in os.listxattr(path)
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError):  # FAT has no such lists
+            return ACCESS_LIST in os.listxattr(path)
     return False
 
 
