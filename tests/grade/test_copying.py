@@ -208,9 +208,9 @@ def test_a_new_analysis_does_not_replace_what_another_program_writes_meanwhile(
     graded().save(path)
     copied = reanalysis.copied
 
-    def slowly(*given: Any) -> Any:
+    def slowly(*given: Any, **how: Any) -> Any:
         path.write_bytes(path.read_bytes() + b"\n")  # without the lock
-        return copied(*given)
+        return copied(*given, **how)
 
     monkeypatch.setattr(reanalysis, "copied", slowly)
     fields = members("merge")

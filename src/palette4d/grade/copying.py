@@ -121,22 +121,23 @@ class Match:
         return between(own, other, configs), between(other, own, configs)
 
     @property
-    def same_clip(self) -> bool:
-        """Whether both are palettes of one clip: places in it stay where they are."""
-        clip, other = (grade.members["clip"] for grade in (self.target, self.source))
-        names = ("source", "size", "frames")
-        return self.time == "relative" and all(clip[name] == other[name] for name in names)
-
-    @property
     def pace(self) -> float:
         """Frames of the target for one frame of the source."""
         return self.back(1.0) - self.back(0.0)
 
 
 def copied(
-    target: Grade, source: Grade, clip: ClipOfPicks, time: Time = "relative"
+    target: Grade,
+    source: Grade,
+    clip: ClipOfPicks,
+    time: Time = "relative",
+    *,
+    same_clip: bool = False,
 ) -> tuple[Grade, Fit]:
-    """Take over the grade of another palette (`Document.copy_from`); return also how it fits."""
+    """Take over the grade of another palette (`Document.copy_from`); return also how it fits.
+
+    In palettes of the same clip picks stay where they were picked.
+    """
     if source.path is not None and target.path is not None and same_file(source.path, target.path):
         raise Palette4dError(
             f"{source.name} is the palette itself, which has this grade already; expected "
@@ -148,7 +149,7 @@ def copied(
     state = dict(_handles(target, _grade(match, _handles_of(source))))
     kept, _ = with_active_kept(target, "before copy")
     after = kept.with_state({**kept.of_kind("version", "note", "lock"), **state})
-    picks = (_pick(match, pick) for pick in source.picks)
+    picks = (_pick(match, pick, same_clip) for pick in source.picks)
     after, left_out = taken(after, clip, [pick for pick in picks if pick is not None])
     label = f"copy the grade of {source.members['clip']['name']}"
     return after.labelled(label), replace(fit(after, source, time), left_out=tuple(left_out))
@@ -258,7 +259,7 @@ def _handles(target: Grade, graded: Callable[[F64, float], F64]) -> Iterator[tup
             yield ("handle", id_), Setting(as_colour(new.tolist()), edge["id"], frame)
 
 
-def _pick(match: Match, pick: Pick) -> Pick | None:
+def _pick(match: Match, pick: Pick, same_clip: bool) -> Pick | None:
     """Return a pick as it is in the target, or None if it does nothing at the chosen frame."""
     _, into = match.conversions
 
@@ -271,7 +272,7 @@ def _pick(match: Match, pick: Pick) -> Pick | None:
         return first + step * round((match.back(frame) - first) / step)
 
     copy = replace(pick, path=(), matte=None)
-    if not match.same_clip:
+    if not same_clip:
         copy = replace(copy, pixel=None, box=None, areas=())
     copy = replace(copy, start=None, until=None, fade=0.0, fade_out=None)
     if pick.to is not None:

@@ -55,14 +55,16 @@ def save(fields: Fields, path: Path, *, on_edits: OnEdits = "refuse") -> tuple[S
 def _copied(former: Grade, new: Grade) -> tuple[Grade, list[str]]:
     """Return the new grade with the look of the former one and of its versions, and notes."""
     clip, notes = ClipOfPicks.of(new), []
+    own, other = (grade.members["clip"] for grade in (new, former))
+    same = all(own[name] == other[name] for name in ("source", "size", "frames"))
     for name in former.versions:
         if (version := former.version(name)).edited:
-            new, _ = copied(new, version, clip)
+            new, _ = copied(new, version, clip, same_clip=same)
             new, _ = save_version(new, name)
             new = set_note(new, name, former.note(name))
             new = reset(new)
     if former.edited:
-        new, fit = copied(new, former, clip)
+        new, fit = copied(new, former, clip, same_clip=same)
         notes.append(f"the palette changed, so that the grade was copied: {fit}")
     return new, notes
 
