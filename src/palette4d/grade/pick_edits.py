@@ -137,7 +137,10 @@ def add_area(grade: Grade, clip: ClipOfPicks, id: str, area: Area) -> Grade:
     clip.check_places(area.frame, area.points)
     changed = replace(old, areas=(*old.areas, area), whole_hue=False)
     what = "a box" if len(area.points) == 1 else "a stroke"
-    return _learned(grade, clip, changed, f"add {what} at frame {area.frame:g} to {id}")
+    label = f"add {what} at frame {area.frame:g} to {id}"
+    if old.whole_hue:
+        label += ", which takes learned colours now, not all of its hue"
+    return _learned(grade, clip, changed, label)
 
 
 def change_pick(
