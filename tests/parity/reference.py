@@ -332,6 +332,16 @@ def odds_of(document: Document, pick: Document, display: F64) -> NDArray[np.int_
     return (np.cumsum(steps, dtype=int) % 256).reshape(GRID)
 
 
+def around(place: F64) -> NDArray[np.bool_]:
+    """(96, 96, 16) which nodes are around a point."""
+    steps = np.array(GRID) - 1
+    low = np.clip((place - LEAST) / (MOST - LEAST) * steps, 0, steps - 1e-9).astype(int)
+    u, v, light = np.minimum(low, steps - 1)
+    nodes = np.zeros(GRID, bool)
+    nodes[u : u + 2, v : v + 2, light : light + 2] = True
+    return nodes
+
+
 def frame_matte(document: Document, pick: Document, first: F64, now: F64) -> F32:
     """A pick's matte with its sliders, moved along with its colour; without holds."""
     odds = odds_of(document, pick, first)
@@ -346,10 +356,7 @@ def frame_matte(document: Document, pick: Document, first: F64, now: F64) -> F32
         moved = between(matte, NODES - along[..., None] * away).astype(np.float32)
         matte = np.where(along > 0, moved, matte)
     # The colour itself is the thing's.
-    steps = np.array(GRID) - 1
-    place = np.clip((point(now) - LEAST) / (MOST - LEAST) * steps, 0, steps - 1e-9).astype(int)
-    u, v, light = np.minimum(place, steps - 1)
-    matte[u : u + 2, v : v + 2, light : light + 2] = 1
+    matte[around(point(now))] = 1
     darkest, lightest = pick.get("lightness", (0, 1))
     taken = np.ones(GRID[2])
     levels = NODES[0, 0, :, 2]
@@ -424,11 +431,10 @@ def picks_at(document: Document, frame: float) -> Picks:
                 continue
             spared = np.ones(GRID)
             for hold, how_much, kept in holds:
-                if kept is not None:
-                    spared *= 1 - how_much * kept.astype(float)
-                    continue
                 to_hold, to_pick = apart2(NODES, hold), apart2(NODES, point(now))
                 share = smooth_step(to_hold / np.maximum(to_hold + to_pick, 1e-9), 0, 0.5)
+                if kept is not None:
+                    share = np.where(around(point(now)), share, 1 - kept.astype(float))
                 spared *= 1 - how_much * (1 - share)
             matte = matte * spared.astype(np.float32)
             found.append(Picked(colour, change_of(pick, frame), strength, matte))

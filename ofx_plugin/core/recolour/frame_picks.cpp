@@ -100,16 +100,21 @@ FrameMatte baked(const Pick& pick, const Vec3& from, const Vec3& to) {
 
 void hold_back(FrameMatte& matte, const Vec3& pick, const std::vector<Held>& holds) {
     if (holds.empty()) return;
+    const MatteGrid::Place p = MatteGrid::place(pick);
     std::size_t at = 0;
     for (int u = 0; u < MatteGrid::kSaturations; ++u) {
         for (int v = 0; v < MatteGrid::kSaturations; ++v) {
             for (int l = 0; l < MatteGrid::kLightnesses; ++l, ++at) {
                 if (matte[at] == 0) continue;
                 const Vec3 node = MatteGrid::point(u, v, l);
+                // The picked colour itself is the thing's, whatever a hold has learned.
+                const bool own = (u == p.u || u == p.u + 1) && (v == p.v || v == p.v + 1) &&
+                                 (l == p.l || l == p.l + 1);
                 double left = 1;
                 for (const Held& hold : holds) {
-                    const double kept = hold.matte.empty() ? 1 - spared(node, hold.point, pick)
-                                                           : static_cast<double>(hold.matte[at]);
+                    const double kept = own || hold.matte.empty()
+                                            ? 1 - spared(node, hold.point, pick)
+                                            : static_cast<double>(hold.matte[at]);
                     left *= 1 - hold.strength * kept;
                 }
                 matte[at] *= static_cast<float>(left);
