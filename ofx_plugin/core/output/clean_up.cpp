@@ -366,13 +366,6 @@ CleanUp::CleanUp(std::shared_ptr<const Recolourer> map,
     first_ = region.first;
     last_ = region.last;
     rows_.resize(static_cast<std::size_t>(last_ - first_));
-    for (int i = 0; i < picks_.count; ++i) {
-        for (int c = 0; c < 3; ++c) {
-            // No pick moves a colour farther, or the other way: amounts are below 2.
-            least_[c] = std::min(least_[c], 2 * picks_.picks[i].change[c]);
-            most_[c] = std::max(most_[c], 2 * picks_.picks[i].change[c]);
-        }
-    }
     for (int k = 0; k < place.cell_width; ++k) {
         parts_.push_back(between(place.cell_width / 2 + k, place.cell_width).part);
     }
@@ -433,10 +426,8 @@ bool CleanUp::change(const float* pixels, int x, int y, int count, double own,
         }
         const std::int64_t start = left + half + node * width;
         load(pixels, x, x + count, static_cast<int>(start), block);
-        CleanUpKernels::Nodes nodes{low + from, high + from, columns, at.part, parts_.data(),
-                                    cells_,     width,       {},      {}};
-        std::copy_n(least_, 3, nodes.least);
-        std::copy_n(most_, 3, nodes.most);
+        CleanUpKernels::Nodes nodes{low + from,    high + from, columns, at.part,
+                                    parts_.data(), cells_,      width};
         if (to - from != cells_) {
             // At the picture's sides the last nodes reach to the end.
             for (int i = 0; i <= cells_; ++i) {

@@ -3,10 +3,9 @@
 //
 // Cells of pixels, counted from the picture's lower left corner, are averaged. In 5 x 5 cells the
 // displacement is fitted by a linear function of the colour. The functions of 5 x 5 cells are
-// averaged, interpolated between the cells' centres, and applied to the pixels' colours. What comes
-// out is limited to what picks may do: a function that was fitted to a red thing would move a white
-// one beside it the other way. Colours beyond 0..1 guide as nearer ones, within -1..2. All sums
-// have a fixed order: tiles, threads and render windows do not change the result.
+// averaged, interpolated between the cells' centres, and applied to the pixels' colours. Colours
+// beyond 0..1 guide as nearer ones, within -1..2. All sums have a fixed order: tiles, threads and
+// render windows do not change the result.
 #pragma once
 
 #include <functional>
@@ -90,7 +89,6 @@ private:
     int first_ = 0, last_ = 0;                             ///< rows of cells that are drawn from
     std::vector<Row> rows_;
     std::vector<float> parts_;
-    float least_[3] = {}, most_[3] = {};  ///< of what picks do
 };
 
 /// The cells of a place, counted from the picture's lower left corner.

@@ -236,9 +236,7 @@ void apply(const CleanUpKernels::Nodes& nodes, CleanUpKernels::ConstChannels gui
                 const float x1 = terms[3 + d][c] + part * steps[3 + d][c];
                 const float x2 = terms[6 + d][c] + part * steps[6 + d][c];
                 const float rest = terms[9 + d][c] + part * steps[9 + d][c];
-                const float fitted = x0 * r[c] + x1 * g[c] + x2 * b[c] + rest;
-                const float above = fitted < nodes.least[d] ? nodes.least[d] : fitted;
-                const float found = above > nodes.most[d] ? nodes.most[d] : above;
+                const float found = x0 * r[c] + x1 * g[c] + x2 * b[c] + rest;
                 const float cleaned = filtered * found + own * by[c];
                 to[c] = n[c] * cleaned;
             }

@@ -53,7 +53,6 @@ struct CleanUpKernels {
         float part;          ///< of the way from low to high
         const float* parts;  ///< of the way from node to node, for each pixel of a cell
         int cells, width;
-        float least[3], most[3];  ///< the functions' values are limited to these
     };
     /// Sets `change` to filtered * (the functions at the guide) + own * `moved`: 0 where `counts`
     /// is.
