@@ -20,7 +20,8 @@ def run(folder: Path, host_test: str | None, required: str) -> subprocess.Comple
     """Run a little project with this repository's conftest and one host test."""
     tests = folder / "tests"
     (tests / "host").mkdir(parents=True)
-    shutil.copy(Path(__file__).with_name("conftest.py"), tests)
+    for name in ("conftest.py", "wine.py"):
+        shutil.copy(Path(__file__).with_name(name), tests)
     (tests / "test_other.py").write_text(OTHER, encoding="utf-8")
     if host_test is not None:
         (tests / "host" / "test_host.py").write_text(host_test, encoding="utf-8")

@@ -176,16 +176,8 @@ TEST(all_instruction_sets_filter_alike) {
             kernels.smooth(rows, kPlane, 0, 100, smooth.data(), 100);
             const float parts[4] = {0.125f, 0.375f, 0.625f, 0.875f};
             float result[3][64] = {};
-            kernels.apply({smooth.data(),
-                           smooth.data() + 5,
-                           100,
-                           0.3f,
-                           parts,
-                           cells,
-                           width,
-                           {-0.1f, -0.2f, 0},
-                           {0, 0.1f, 0.2f}},
-                          own, kept, counts, 0.75f, 0.25f, result);
+            kernels.apply({smooth.data(), smooth.data() + 5, 100, 0.3f, parts, cells, width}, own,
+                          kept, counts, 0.75f, 0.25f, result);
             found.insert(found.end(), sums.begin(), sums.end());
             found.insert(found.end(), smooth.begin(), smooth.end());
             found.insert(found.end(), &result[0][0], &result[0][0] + 192);
@@ -230,7 +222,6 @@ TEST(colours_that_are_none_take_no_part) {
     }
     const Image first = cleaned_picture(in, drawing, true),
                 second = cleaned_picture(other, drawing, true);
-    int moved = 0;
     for (int i = 0; i < 80 * 60; ++i) {
         const auto from = static_cast<std::ptrdiff_t>(i) * 4;
         const bool passes = in.data[static_cast<std::size_t>(from + 3)] == 0;
@@ -238,10 +229,8 @@ TEST(colours_that_are_none_take_no_part) {
             return std::vector<float>(image.data.begin() + from, image.data.begin() + from + 4);
         };
         CHECK(passes ? same_bits(bits(first), bits(in)) && same_bits(bits(second), bits(other))
-                     : same_bits(bits(first), bits(second)));
-        moved += !same_bits(bits(first), bits(in));
+                     : same_bits(bits(first), bits(second)) && !same_bits(bits(first), bits(in)));
     }
-    CHECK(moved > 80 * 60 / 2);  // the others would move the other way
 }
 
 TEST(strength_scales_what_is_cleaned_up) {
