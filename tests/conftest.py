@@ -28,9 +28,9 @@ from wine import WINE
 REPO_ROOT = Path(__file__).resolve().parent.parent
 
 
-if (
-    WINE
-):  # its Windows lacks what Python 3.13 copies files with; palette4d itself does not ask for it
+if WINE:
+    # Wine's Windows has no CopyFile2, which Python 3.13 copies files with; without it, shutil falls
+    # back to its own copies. Only tests copy files so, and Windows itself has the call.
     del shutil._winapi.CopyFile2  # type: ignore[attr-defined]
 
 

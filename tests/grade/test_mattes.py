@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -259,3 +260,19 @@ def test_a_log_clip_is_told_apart_as_its_picture_is(pictures: F32) -> None:
         assert learned.seen
         taken.append(learned.share)
     assert taken[0] == pytest.approx(taken[1], rel=0.05)
+
+
+def test_frames_that_a_hold_marks_are_read(pictures: F32) -> None:
+    """Its colour is background where it was marked, whichever frame the pick was made in."""
+    pick = Pick("p1", "pick", 0, tuple(COAT.tolist()), to=(0.1, 0.2, 0.7), pixel=CLICK, box=9)
+    pick = replace(pick, until=0)
+    area = Area(5, ((130.0, 50.0),), 4.0)
+    hold = Pick("p2", "hold", 5, tuple(DOOR.tolist()), areas=(area,))
+    frames: list[int] = []
+
+    def read(frame: int) -> F32:
+        frames.append(frame)
+        return pictures[frame]
+
+    mattes.learn(pick, [hold], range(FRAMES), read, None)
+    assert frames == [0, 5]

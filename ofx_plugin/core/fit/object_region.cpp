@@ -184,14 +184,6 @@ bool nearer(const Vec3& point, const std::vector<Vec3>& one, const std::vector<V
 /// an edge is long.
 Mask held_side(const View& view, const Mask& object, const Mask& held,
                const MarkedColours& marked) {
-    std::array<Image, 3> smooth;
-    for (std::size_t c = 0; c < 3; ++c) {
-        Image plane(view.size());
-        for (std::size_t i = 0; i < view.size(); ++i) {
-            plane[i] = static_cast<float>(view.point[i][c] * (c == 2 ? kLightnessWeight : 1));
-        }
-        smooth[c] = smoothed(view, plane);
-    }
     Mask side(view.size(), 0), done(view.size(), 0);
     std::vector<float> length(view.size(), std::numeric_limits<float>::infinity());
     using Way = std::pair<float, std::size_t>;
@@ -210,7 +202,7 @@ Mask held_side(const View& view, const Mask& object, const Mask& held,
         done[i] = 1;
         const auto visit = [&, from = i, so_far = own](std::size_t to) {
             float step = kShortest;
-            for (const Image& plane : smooth) {
+            for (const Image& plane : view.ways) {
                 const float change = plane[to] - plane[from];
                 step += change * change;
             }
@@ -359,6 +351,13 @@ View reduced(const LearningFrame& frame, const Vec3& picked, const DisplayCurve*
         mark(marked, view, {area}, scale);
         grow_object(view, marked, start, held);
         for (std::size_t i = 0; i < size; ++i) view.seed[i] |= marked[i];
+    }
+    for (std::size_t c = 0; c < 3 && !view.held.empty(); ++c) {
+        Image plane(size);
+        for (std::size_t i = 0; i < size; ++i) {
+            plane[i] = static_cast<float>(view.point[i][c] * (c == 2 ? kLightnessWeight : 1));
+        }
+        view.ways[c] = smoothed(view, plane);
     }
     view.seeded = frame.seeded;
     if (frame.seeded && frame.object.empty()) seed_by_colour(view, start);

@@ -27,9 +27,10 @@ struct View {
     std::vector<Vec3> point;     ///< as if the picked colour were where it was picked
     Mask real;                   ///< has a colour
     Image amount, grows;
-    Mask seed;               ///< what the user marked as the object's
-    std::vector<Mask> held;  ///< what is held, by area
-    MarkedColours marked;    ///< in this frame
+    Mask seed;                  ///< what the user marked as the object's
+    std::vector<Mask> held;     ///< what is held, by area
+    MarkedColours marked;       ///< in this frame
+    std::array<Image, 3> ways;  ///< smoothed points, of frames with what is held
     bool seeded = false;
     std::vector<std::uint32_t> node;  ///< the nearest node
 

@@ -17,7 +17,8 @@ constexpr double kLightnessEnd = 0.1;
 struct Held {
     Vec3 point;
     double strength;
-    FrameMatte matte;  ///< empty: nothing was learned
+    FrameMatte matte;
+    bool learned;
 };
 
 /// Sets the nodes around a point.
@@ -112,9 +113,8 @@ void hold_back(FrameMatte& matte, const Vec3& pick, const std::vector<Held>& hol
                                  (l == p.l || l == p.l + 1);
                 double left = 1;
                 for (const Held& hold : holds) {
-                    const double kept = own || hold.matte.empty()
-                                            ? 1 - spared(node, hold.point, pick)
-                                            : static_cast<double>(hold.matte[at]);
+                    const double kept = own || !hold.learned ? 1 - spared(node, hold.point, pick)
+                                                             : static_cast<double>(hold.matte[at]);
                     left *= 1 - hold.strength * kept;
                 }
                 matte[at] *= static_cast<float>(left);
@@ -154,8 +154,8 @@ FramePick frame_pick(const Moment& moment, const std::vector<Held>& holds, doubl
 std::vector<Held> held_at(const std::vector<Moment>& holds) {
     std::vector<Held> held;
     for (const Moment& hold : holds) {
-        held.push_back({hold.point, hold.strength, {}});
-        if (hold.pick->matte) held.back().matte = baked(*hold.pick, hold.first, hold.point);
+        held.push_back({hold.point, hold.strength, baked(*hold.pick, hold.first, hold.point),
+                        hold.pick->matte != nullptr});
     }
     return held;
 }
@@ -165,17 +165,15 @@ std::vector<Held> held_at(const std::vector<Moment>& holds) {
 FramePicks picks_at(const Edits& edits, double frame) {
     FramePicks result;
     result.display = edits.display;
-    const std::vector<Moment> holds = moments(edits, frame, true);
-    if (!holds.empty()) {
+    const std::vector<Held> held = held_at(moments(edits, frame, true));
+    if (!held.empty()) {
         FrameMatte left(MatteGrid::kSize, 1.0f);
-        for (const Moment& hold : holds) {
-            FrameMatte matte = baked(*hold.pick, hold.first, hold.point);
+        for (const Held& hold : held) {
             const auto strength = static_cast<float>(hold.strength);
-            for (std::size_t i = 0; i < left.size(); ++i) left[i] *= 1 - strength * matte[i];
+            for (std::size_t i = 0; i < left.size(); ++i) left[i] *= 1 - strength * hold.matte[i];
         }
         result.left = std::make_shared<const FrameMatte>(std::move(left));
     }
-    const std::vector<Held> held = held_at(holds);
     for (const Moment& pick : moments(edits, frame, false)) {
         result.picks.push_back(frame_pick(pick, held, frame));
     }
