@@ -6,6 +6,7 @@
 
 #include "harness.hpp"
 #include "output/clean_up.hpp"
+#include "tiles.hpp"
 
 using namespace strict;
 using namespace test;
@@ -62,26 +63,6 @@ Picture scene_of(const Layout& layout) {
     return picture;
 }
 
-/// A part of a picture, as a host with tiles gives it.
-Picture part_of(const Picture& whole, const OfxRectI& area) {
-    Layout layout = whole.layout();
-    layout.definition = layout.bounds;
-    layout.bounds = area;
-    Picture part(layout);
-    const auto row = static_cast<std::size_t>(layout.width() * layout.pixel_bytes());
-    for (int y = area.y1; y < area.y2; ++y) {
-        std::memcpy(part.at(area.x1, y), whole.at(area.x1, y), row);
-    }
-    return part;
-}
-
-OfxRectI within(const std::array<double, 4>& region, const OfxRectI& bounds) {
-    return {std::max(static_cast<int>(std::floor(region[0])), bounds.x1),
-            std::max(static_cast<int>(std::floor(region[1])), bounds.y1),
-            std::min(static_cast<int>(std::ceil(region[2])), bounds.x2),
-            std::min(static_cast<int>(std::ceil(region[3])), bounds.y2)};
-}
-
 }  // namespace
 
 TEST(picks_are_cleaned_up_as_in_a_file) {
@@ -113,17 +94,11 @@ TEST(tiles_with_their_region_of_interest_are_the_whole_picture) {
                 node.set("output", output);
                 const auto whole = node.render(source, 2);
                 Picture tiles(layout);
-                for (int y = layout.bounds.y1; y < layout.bounds.y2; y += 13) {
-                    for (int x = layout.bounds.x1; x < layout.bounds.x2; x += 37) {
-                        const OfxRectI window = {x, y, std::min(x + 37, layout.bounds.x2),
-                                                 std::min(y + 13, layout.bounds.y2)};
-                        std::array<double, 4> region = {double(window.x1), double(window.y1),
-                                                        double(window.x2), double(window.y2)};
-                        CHECK(node.instance->region_of_interest(2, 1, region) == kOfxStatOK);
-                        const Picture part = part_of(source, within(region, layout.bounds));
-                        CHECK(node.instance->render(2, &part, tiles, window) == kOfxStatOK);
-                    }
-                }
+                each_tile(layout.bounds, [&](const OfxRectI& window, std::array<double, 4> region) {
+                    CHECK(node.instance->region_of_interest(2, 1, region) == kOfxStatOK);
+                    const Picture part = part_of(source, within(region, layout.bounds));
+                    CHECK(node.instance->render(2, &part, tiles, window) == kOfxStatOK);
+                });
                 CHECK(tiles.pixels(layout.bounds) == whole);
             }
         }

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "gpu_node.hpp"
+#include "tiles.hpp"
 
 using namespace strict;
 using namespace test;
@@ -36,25 +37,6 @@ Layout layout_of(const OfxRectI& bounds) {
     Layout layout;
     layout.bounds = bounds;
     return layout;
-}
-
-/// A part of a picture, as a host with tiles gives it.
-Picture part_of(const Picture& whole, const std::array<double, 4>& region) {
-    Layout layout = whole.layout();
-    const OfxRectI all = layout.bounds;
-    layout.definition = all;
-    layout.padding = 16;
-    layout.bounds = rect(std::max(static_cast<int>(std::floor(region[0])), all.x1),
-                         std::max(static_cast<int>(std::floor(region[1])), all.y1),
-                         std::min(static_cast<int>(std::ceil(region[2])), all.x2),
-                         std::min(static_cast<int>(std::ceil(region[3])), all.y2));
-    Picture part(layout);
-    const OfxRectI& b = layout.bounds;
-    for (int y = b.y1; y < b.y2; ++y) {
-        std::copy_n(whole.at(b.x1, y), static_cast<std::ptrdiff_t>(16) * (b.x2 - b.x1),
-                    part.at(b.x1, y));
-    }
-    return part;
 }
 
 }  // namespace
@@ -109,32 +91,29 @@ TEST(gpu_tiles_with_their_region_of_interest_are_the_whole_picture) {
         const Picture source = areas_of(layout);
         const auto whole = floats(layout, node.draw(&source, layout, layout.bounds, nullptr));
         Picture tiles(layout);
-        for (int y = layout.bounds.y1; y < layout.bounds.y2; y += 13) {
-            for (int x = layout.bounds.x1; x < layout.bounds.x2; x += 37) {
-                const OfxRectI window = {x, y, std::min(x + 37, layout.bounds.x2),
-                                         std::min(y + 13, layout.bounds.y2)};
-                std::array<double, 4> region = {double(window.x1), double(window.y1),
-                                                double(window.x2), double(window.y2)};
-                CHECK(node.instance->region_of_interest(3, 1, region) == kOfxStatOK);
-                const Picture part = part_of(source, region);
-                node.instance->gpu = gpu.get();
-                CHECK(node.instance->render(3, &part, tiles, window) == kOfxStatOK);
-                node.instance->gpu = nullptr;
-                CHECK(node.by_kernel());
-                // A host that gives less: what there is, as on the processor.
-                const Picture less = part_of(source, {double(x), double(y), x + 30.0, y + 40.0});
-                Picture here(layout), there(layout);
-                CHECK(node.instance->render(3, &less, here, window) == kOfxStatOK);
-                node.instance->gpu = gpu.get();
-                CHECK(node.instance->render(3, &less, there, window) == kOfxStatOK);
-                node.instance->gpu = nullptr;
-                const auto a = floats(layout, here.pixels(window)),
-                           b = floats(layout, there.pixels(window));
-                for (std::size_t i = 0; i < a.size(); ++i) {
-                    CHECK(!(std::abs(a[i] - b[i]) > kPromise * std::max(1.0f, std::abs(a[i]))));
-                }
+        each_tile(layout.bounds, [&](const OfxRectI& window, std::array<double, 4> region) {
+            CHECK(node.instance->region_of_interest(3, 1, region) == kOfxStatOK);
+            const Picture part = part_of(source, within(region, layout.bounds), 16);
+            node.instance->gpu = gpu.get();
+            CHECK(node.instance->render(3, &part, tiles, window) == kOfxStatOK);
+            node.instance->gpu = nullptr;
+            CHECK(node.by_kernel());
+            // A host that gives less: what there is, as on the processor.
+            const OfxRectI fewer =
+                within({double(window.x1), double(window.y1), window.x1 + 30.0, window.y1 + 40.0},
+                       layout.bounds);
+            const Picture less = part_of(source, fewer, 16);
+            Picture here(layout), there(layout);
+            CHECK(node.instance->render(3, &less, here, window) == kOfxStatOK);
+            node.instance->gpu = gpu.get();
+            CHECK(node.instance->render(3, &less, there, window) == kOfxStatOK);
+            node.instance->gpu = nullptr;
+            const auto a = floats(layout, here.pixels(window)),
+                       b = floats(layout, there.pixels(window));
+            for (std::size_t i = 0; i < a.size(); ++i) {
+                CHECK(!(std::abs(a[i] - b[i]) > kPromise * std::max(1.0f, std::abs(a[i]))));
             }
-        }
+        });
         const auto drawn = floats(layout, tiles.pixels(layout.bounds));
         for (std::size_t i = 0; i < whole.size(); ++i) {
             CHECK(!(std::abs(whole[i] - drawn[i]) > kPromise * std::max(1.0f, std::abs(whole[i]))));
