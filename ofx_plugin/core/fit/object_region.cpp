@@ -179,11 +179,9 @@ bool nearer(const Vec3& point, const std::vector<Vec3>& one, const std::vector<V
     return away(one) < away(other);
 }
 
-/// The pixels that are nearer to what is held than to the object, in the frame and in saturation. A
-/// way in the frame is as long as the squares of its steps in pick space: a gradual shade is short,
-/// an edge is long.
-Mask held_side(const View& view, const Mask& object, const Mask& held,
-               const MarkedColours& marked) {
+/// The pixels that are nearer to what is held than to the object, in the frame. A way is as long as
+/// the squares of its steps in pick space: a gradual shade is short, an edge is long.
+Mask held_side(const View& view, const Mask& object, const Mask& held) {
     Mask side(view.size(), 0), done(view.size(), 0);
     std::vector<float> length(view.size(), std::numeric_limits<float>::infinity());
     using Way = std::pair<float, std::size_t>;
@@ -215,9 +213,6 @@ Mask held_side(const View& view, const Mask& object, const Mask& held,
         if (i % width + 1 < width) visit(i + 1);
         if (i >= width) visit(i - width);
         if (i + width < view.size()) visit(i + width);
-    }
-    for (std::size_t i = 0; i < view.size(); ++i) {
-        side[i] &= held[i] || nearer(view.point[i], marked.held, marked.own);
     }
     return side;
 }
@@ -365,6 +360,9 @@ View reduced(const LearningFrame& frame, const Vec3& picked, const DisplayCurve*
         view.seed[i] &= view.real[i];
         for (Mask& marked : view.held) marked[i] &= view.real[i];
     }
+    if (view.seeded && !view.held.empty()) {
+        view.side = held_side(view, view.seed, any_of(view.held, size));
+    }
     for (const Mask& marked : view.held) {
         Vec3 sum{};
         double count = 0;
@@ -404,8 +402,12 @@ Parts find_object(const View& view, const Grid& membership, const Grid& sure,
     std::vector<Mask> held = view.held;
     Mask unsure(view.size(), 0);
     if (!held.empty()) {
-        const Mask side = held_side(view, seeds, any_of(held, view.size()), marked);
-        for (std::size_t i = 0; i < view.size(); ++i) region[i] &= !side[i];
+        const Mask all = any_of(held, view.size());
+        Mask side = view.seeded ? view.side : held_side(view, seeds, all);
+        for (std::size_t i = 0; i < view.size(); ++i) {
+            side[i] &= all[i] || nearer(view.point[i], marked.held, marked.own);
+            region[i] &= !side[i];
+        }
         for (Mask& area : held) grow_held(view, area, side);
     } else if (!marked.held.empty()) {
         // Only the colour says what is held: not enough to call it background.

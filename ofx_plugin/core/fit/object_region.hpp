@@ -31,6 +31,7 @@ struct View {
     std::vector<Mask> held;     ///< what is held, by area
     MarkedColours marked;       ///< in this frame
     std::array<Image, 3> ways;  ///< smoothed points, of frames with what is held
+    Mask side;                  ///< nearer to what is held, in seeded frames with such
     bool seeded = false;
     std::vector<std::uint32_t> node;  ///< the nearest node
 
