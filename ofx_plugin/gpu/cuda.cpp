@@ -15,7 +15,8 @@ namespace {
 using Handle = void*;
 using Pointer = std::uint64_t;
 
-constexpr int kMostShared = 8;  // CU_FUNC_ATTRIBUTE_MAX_DYNAMIC_SHARED_SIZE_BYTES
+constexpr int kMostShared = 8;    // CU_FUNC_ATTRIBUTE_MAX_DYNAMIC_SHARED_SIZE_BYTES
+constexpr unsigned kUntimed = 2;  // CU_EVENT_DISABLE_TIMING
 constexpr unsigned kThreads = 128, kRows = 8;
 
 struct CudaFunctions : Functions {
@@ -40,6 +41,9 @@ struct CudaFunctions : Functions {
     PALETTE4D_FUNCTION(int, cuMemcpyHtoDAsync_v2, Pointer, const void*, std::size_t, Handle);
     PALETTE4D_FUNCTION(int, cuMemcpyDtoHAsync_v2, void*, Pointer, std::size_t, Handle);
     PALETTE4D_FUNCTION(int, cuStreamSynchronize, Handle);
+    PALETTE4D_FUNCTION(int, cuStreamWaitEvent, Handle, Handle, unsigned);
+    PALETTE4D_FUNCTION(int, cuEventCreate, Handle*, unsigned);
+    PALETTE4D_FUNCTION(int, cuEventRecord, Handle, Handle);
     bool usable = complete && cuInit(0) == 0;
     // Since CUDA 11.2, and 12.0: null in older drivers.
     PALETTE4D_FUNCTION(int, cuMemAllocAsync, Pointer*, std::size_t, Handle);
@@ -57,10 +61,13 @@ const CudaFunctions* cuda_functions() {
 struct Module : Context {
     Handle module = nullptr;
     std::array<Handle, kKernels.size()> functions{};
+    Handle passed = nullptr;  ///< an event: after the last passes that left each other something
 
     std::string load(const CudaFunctions& cu) {
         if (functions.back()) return "";
-        int error = cu.cuModuleLoadData(&module, cuda_ptx());
+        int error = cu.cuEventCreate(&passed, kUntimed);
+        if (error) return driver_error("cuEventCreate", error);
+        error = cu.cuModuleLoadData(&module, cuda_ptx());
         if (error) return driver_error("cuModuleLoadData", error);
         for (std::size_t i = 0; i < kKernels.size(); ++i) {
             error = cu.cuModuleGetFunction(&functions[i], module, kKernels[i]);
@@ -81,7 +88,7 @@ CudaKey current_context(const CudaFunctions& cu) {
     return key;
 }
 
-/// Modules are not unloaded: they go with their context, which may be gone when they are dropped.
+/// Modules and events go with their context alone, which may be gone when they are dropped.
 using Modules = Kept<CudaKey, Module>;
 
 class CudaQueue final : public Queue {
@@ -122,21 +129,23 @@ private:
         return reinterpret_cast<Pointer>(place.data) + static_cast<Pointer>(at);
     }
 
-    /// Memory of a stream, or of the context in older drivers.
+    /// Memory of a stream, or of the context where a driver or a device has no other.
     struct Memory {
         const CudaFunctions& cu;
         Handle stream;
         Pointer at = 0;
         int error = 0;
+        bool of_stream;
         Memory(const CudaFunctions& functions, std::size_t size, Handle of)
-            : cu(functions), stream(of) {
-            error = cu.cuMemFreeAsync ? cu.cuMemAllocAsync(&at, size, stream)
-                                      : cu.cuMemAlloc_v2(&at, size);
+            : cu(functions),
+              stream(of),
+              of_stream(cu.cuMemFreeAsync && cu.cuMemAllocAsync(&at, size, stream) == 0) {
+            if (!of_stream) error = cu.cuMemAlloc_v2(&at, size);
             if (error) at = 0;
         }
         ~Memory() {
             if (!at) return;
-            if (cu.cuMemFreeAsync) {
+            if (of_stream) {
                 cu.cuMemFreeAsync(at, stream);
             } else {
                 cu.cuMemFree_v2(at);  // waits for what uses it
@@ -168,8 +177,11 @@ private:
                 out = address(window.out, window.out.start), at = memory.at,
                 grids_at = memory.at + table;
         void* kept = nullptr;
-        const std::string problem = scratch(frame, stream_, kept);
+        // By any stream: another one may have this one's handle, while its work goes on.
+        const std::string problem = scratch(frame, nullptr, kept);
         if (!problem.empty()) return problem;
+        error = kept ? cu_.cuStreamWaitEvent(stream_, module_->passed, 0) : 0;
+        if (error) return driver_error("cuStreamWaitEvent", error);
         int size = static_cast<int>(frame.table.size());
         long long in_row = window.in.row / 4, out_row = window.out.row / 4;
         Window w = window;
@@ -185,6 +197,8 @@ private:
                                        static_cast<unsigned>(table), stream_, arguments, nullptr);
             if (error) return driver_error("cuLaunchKernel", error);
         }
+        error = kept ? cu_.cuEventRecord(module_->passed, stream_) : 0;
+        if (error) return driver_error("cuEventRecord", error);
         return waits_ ? wait() : "";
     }
 

@@ -246,7 +246,11 @@ private:
     std::shared_ptr<void> allocate(std::size_t bytes, std::string& problem) override {
         const Handle memory = mt_.send(device_, "newBufferWithLength:options:", bytes, kPrivate);
         if (!memory) problem = "Metal has no memory for the clean-up of picks";
-        return {memory, [&mt = mt_](Handle of) { mt.send<void>(of, "release"); }};
+        // Kept, so that no other queue gets its handle.
+        return {memory, [&mt = mt_, queue = mt_.send(queue_, "retain")](Handle of) {
+                    mt.send<void>(of, "release");
+                    mt.send<void>(queue, "release");
+                }};
     }
 
     const MetalFunctions& mt_;

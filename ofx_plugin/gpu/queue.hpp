@@ -46,7 +46,7 @@ struct Context {
     std::string problem{};  ///< a driver's error; after it the kernel is not asked again
     /// Pinned memory that no render uses, and its bytes: what a frame takes.
     std::pair<std::shared_ptr<char>, std::size_t> older{}, newer{};
-    /// The device's memory for what passes leave to each other, of the queue that used it last.
+    /// The device's memory for what passes leave to each other, of the one queue that uses it.
     struct Scratch {
         const void* queue = nullptr;
         std::size_t bytes = 0;
@@ -79,7 +79,8 @@ protected:
     /// Makes the kernel ready; under the context's mutex.
     virtual std::string load() = 0;
     virtual std::string enqueue(const FrameTable& frame, const Window& window) = 0;
-    /// Sets the memory for a frame's passes. The context's mutex is held until they are enqueued.
+    /// Sets the memory for a frame's passes. Only those of `queue` use it, which stays alive; or
+    /// null, and passes wait for the last ones. The mutex is held until they are enqueued.
     std::string scratch(const FrameTable& frame, const void* queue, void*& memory);
     /// The device's memory, until nothing uses it; null: `problem` says why.
     virtual std::shared_ptr<void> allocate(std::size_t bytes, std::string& problem) = 0;

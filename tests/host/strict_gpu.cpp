@@ -100,19 +100,20 @@ private:
 
 class CudaGpu final : public Gpu {
 public:
-    CudaGpu(void* library, bool stream) : cu_{library} {
+    CudaGpu(void* library, Stream stream) : cu_{library}, own_(stream == Stream::kOwn) {
         check(cu_.get<int(STRICT_API*)(int*, int)>("cuDeviceGet")(&device_, 0), "cuDeviceGet");
         check(
             cu_.get<int(STRICT_API*)(Handle*, int)>("cuDevicePrimaryCtxRetain")(&context_, device_),
             "cuDevicePrimaryCtxRetain");
         use();
-        if (stream) {
+        if (own_) {
             check(cu_.get<int(STRICT_API*)(Handle*, unsigned)>("cuStreamCreate")(&stream_, 1),
                   "cuStreamCreate");
         }
+        if (stream == Stream::kOfThread) stream_ = reinterpret_cast<Handle>(2);
     }
     ~CudaGpu() override {
-        if (stream_) cu_.get<int(STRICT_API*)(Handle)>("cuStreamDestroy_v2")(stream_);
+        if (own_) cu_.get<int(STRICT_API*)(Handle)>("cuStreamDestroy_v2")(stream_);
         cu_.get<int(STRICT_API*)(int)>("cuDevicePrimaryCtxRelease_v2")(device_);
     }
 
@@ -171,6 +172,7 @@ private:
     }
 
     Library cu_;
+    const bool own_;
     int device_ = 0;
     Handle context_ = nullptr, stream_ = nullptr;
 };
@@ -200,7 +202,7 @@ std::unique_ptr<Gpu> opencl_gpu() {
     return nullptr;
 }
 
-std::unique_ptr<Gpu> cuda_gpu(bool stream) {
+std::unique_ptr<Gpu> cuda_gpu(Stream stream) {
     static void* const library = load_library({"libcuda.so.1", "nvcuda.dll"});
     if (!library || found<int(STRICT_API*)(unsigned)>(library, "cuInit")(0)) return nullptr;
     return std::make_unique<CudaGpu>(library, stream);

@@ -31,7 +31,8 @@ public:
 
 /// Null where the system has no device.
 std::unique_ptr<Gpu> opencl_gpu();
-/// With or without a stream in the arguments.
-std::unique_ptr<Gpu> cuda_gpu(bool stream = true);
+/// The stream in the arguments; that of each thread has the same handle in all of them.
+enum class Stream { kOwn, kNone, kOfThread };
+std::unique_ptr<Gpu> cuda_gpu(Stream stream = Stream::kOwn);
 
 }  // namespace strict

@@ -23,7 +23,7 @@ std::vector<std::unique_ptr<Gpu>> test::gpus() {
     return all;  // it does not know the locks of pocl's own threads
 #endif
     if (auto gpu = opencl_gpu()) all.push_back(std::move(gpu));
-    for (const bool stream : {true, false}) {
+    for (const Stream stream : {Stream::kOwn, Stream::kNone}) {
         if (auto gpu = cuda_gpu(stream)) all.push_back(std::move(gpu));
     }
     const char* const required = std::getenv("PALETTE4D_REQUIRE_GPU");

@@ -37,7 +37,7 @@ std::vector<std::unique_ptr<Gpu>> gpus_to_check() {
     config.processors = 16;
     Host::get().configure(config);
     std::vector<std::unique_ptr<Gpu>> all;
-    for (const bool stream : {true, false}) {
+    for (const Stream stream : {Stream::kOwn, Stream::kNone}) {
         if (auto gpu = cuda_gpu(stream)) all.push_back(std::move(gpu));
     }
     if (auto gpu = opencl_gpu()) all.push_back(std::move(gpu));

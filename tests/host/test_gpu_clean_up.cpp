@@ -174,3 +174,54 @@ TEST(gpu_threads_and_queues_share_no_passes) {
         instances.clear();
     }
 }
+
+TEST(gpu_frames_that_nobody_waits_for_share_no_passes) {
+    for (const auto& gpu : gpus()) {
+        const bool cuda = gpu->device().find("CUDA") != std::string::npos;
+        Both node(*gpu, write("picks.p4d.json", text_with_picks()));
+        std::atomic<int> wrong{0};
+        const auto draw = [&](Instance& instance, const Picture& source,
+                              const std::vector<unsigned char>& expected) {
+            // CUDA's stream of a thread has the same handle in each of them.
+            const auto own = cuda ? cuda_gpu(Stream::kOfThread) : opencl_gpu();
+            std::vector<Picture> outputs(8, Picture(source.layout()));
+            std::map<const Picture*, void*> memory;
+            const auto allocate = [&](const Picture& of) {
+                Picture& picture = const_cast<Picture&>(of);
+                memory[&of] = own->allocate(picture.rest(), picture.rest_size());
+            };
+            allocate(source);
+            for (const Picture& output : outputs) allocate(output);
+            instance.gpu = own.get();
+            for (int round = 0; round < 5; ++round) {
+                for (Picture& output : outputs) {
+                    wrong += instance.render_there(3, source, output, memory) != kOfxStatOK;
+                }
+                for (Picture& output : outputs) {
+                    own->download(memory[&output], output.rest(), output.rest_size());
+                    wrong += output.pixels(output.layout().bounds) != expected;
+                }
+            }
+            for (const auto& [picture, at] : memory) own->release(at);
+        };
+        std::vector<std::unique_ptr<Instance>> instances;
+        std::vector<Picture> sources;
+        std::vector<std::vector<unsigned char>> expected;
+        for (int t = 0; t < 4; ++t) {
+            // So large that frames of several threads run at once, and each of another size.
+            const Layout layout = layout_of(rect(0, 0, (cuda ? 640 : 64) - 8 * t, cuda ? 360 : 36));
+            sources.push_back(areas_of(layout));
+            expected.push_back(node.draw(&sources.back(), layout, layout.bounds, gpu.get()));
+            instances.push_back(node.plugin.create());
+            instances.back()->set("sidecar", node.path);
+        }
+        std::vector<std::thread> threads;
+        for (std::size_t t = 0; t < instances.size(); ++t) {
+            threads.emplace_back(draw, std::ref(*instances[t]), std::cref(sources[t]),
+                                 std::cref(expected[t]));
+        }
+        for (std::thread& thread : threads) thread.join();
+        CHECK(wrong == 0);
+        instances.clear();
+    }
+}
