@@ -18,16 +18,19 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-NEW_USER_NAMESPACE, SYSTEM_V_MEMORY, IO_URING_SETUP = 0x10000000, 29, 425
+NEW_USER_NAMESPACE, IO_URING_SETUP = 0x10000000, 425
+#: Of shmctl, and of ioctl for a file's flags.
+INFORMATION, SET_FLAGS = 3, 0x40086602
 
 
 def attempts(home: Path, parent: int) -> dict[str, Callable[[], object]]:
     """What must fail, by name; `home` has .ssh/id_rsa and .bashrc."""
     libc = ctypes.CDLL(None, use_errno=True)
-    bashrc = home / ".bashrc"
+    libc.shmat.restype = ctypes.c_ssize_t
+    bashrc, buffer = home / ".bashrc", ctypes.create_string_buffer(200)
 
     def checked(result: int) -> None:
-        if result < 0:
+        if result == -1:
             raise OSError(ctypes.get_errno(), "refused")
 
     return {
@@ -46,8 +49,18 @@ def attempts(home: Path, parent: int) -> dict[str, Callable[[], object]]:
         "truncate": lambda: os.truncate(bashrc, 1),
         "listen": lambda: socket.socket().bind(("127.0.0.1", 0)),
         "local socket": lambda: socket.socket(socket.AF_UNIX).close(),
+        # sendto() takes such a pair to the socket of any program
+        "datagram": lambda: socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)[0].close(),
+        "raw datagram": lambda: socket.socketpair(socket.AF_UNIX, socket.SOCK_RAW)[0].close(),
         "run a program": lambda: subprocess.run(["/bin/true"], check=True),
+        "start a process": lambda: os.fork() or os._exit(0),
         "signal": lambda: os.kill(parent, 0),
+        "find shared memory": lambda: checked(libc.shmctl(0, INFORMATION, buffer)),
+        "attach shared memory": lambda: checked(libc.shmat(int(os.environ["MEMORY"]), None, 0)),
+        "watch all files": lambda: checked(libc.fanotify_init(4, 0)),
+        "change a file's flags": lambda: checked(
+            libc.ioctl(os.open(bashrc, os.O_RDONLY), SET_FLAGS, b"\x80" + bytes(7))
+        ),
         "namespace": lambda: checked(libc.unshare(NEW_USER_NAMESPACE)),
         "io_uring": lambda: checked(
             libc.syscall(ctypes.c_long(IO_URING_SETUP), 1, ctypes.create_string_buffer(120))

@@ -42,8 +42,12 @@ _NO_NEW_PRIVILEGES, _SECCOMP_FILTER = 38, 1
 _ALLOW, _ERRNO, _KILL = 0x7FFF0000, 0x00050000, 0x80000000
 _EPERM, _ENOSYS = 1, 38
 _LOAD, _EQUAL, _AT_LEAST, _ANY_BIT, _RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
-_NEW_NAMESPACES = 0x7E020000  # of clone: any CLONE_NEW…
-_INJECTING = (0x5412, 0x541C)  # of ioctl: TIOCSTI, TIOCLINUX type on the user's terminal
+_NEW_NAMESPACES, _THREAD = 0x7E020000, 0x00010000  # of clone: any CLONE_NEW…, CLONE_THREAD
+_LOCAL, _NO_STREAM = 1, 0b1110  # of socketpair: AF_UNIX, all types but SOCK_STREAM
+#: Of ioctl: TIOCSTI, TIOCLINUX type on the user's terminal; FS_IOC_SETFLAGS, FS_IOC_FSSETXATTR.
+_REFUSED_CONTROLS = (0x5412, 0x541C, 0x40086602, 0x401C5820)
+# linux/capability.h
+_CAPABILITIES, _OPENING = 0x20080522, 0b1110  # version 3; DAC_OVERRIDE, DAC_READ_SEARCH, FOWNER
 
 
 @functools.cache
@@ -124,6 +128,7 @@ def confine(
         _call("landlock_restrict_self", rules, 0)
     finally:
         os.close(rules)
+    _drop_capabilities()
     _filter_calls(starts)
 
 
@@ -153,6 +158,16 @@ def holds_home(folder: Path) -> bool:
     return Path(os.path.realpath(Path.home())).is_relative_to(os.path.realpath(folder))
 
 
+def _drop_capabilities() -> None:
+    """Keep those of root that open files of others, if this is root."""
+    head = struct.pack("=Ii", _CAPABILITIES, 0)
+    buffer = ctypes.create_string_buffer(24)  # twice effective, permitted and inheritable
+    if _libc().syscall(ctypes.c_long(number("capget")), head, buffer) < 0:
+        raise _refused("capget")
+    kept = struct.unpack("=6I", buffer.raw)[1] & _OPENING
+    _call("capset", head, struct.pack("=6I", kept, kept, 0, 0, 0, 0))
+
+
 def _filter_calls(starts: bool) -> None:
     program = _program(starts)
     steps = b"".join(struct.pack("=HBBI", *step) for step in program)
@@ -177,12 +192,17 @@ def _program(starts: bool) -> list[tuple[int, int, int, int]]:
         for name, own in (("tgkill", os.getpid()), ("prlimit64", 0)):
             steps += [(_EQUAL, 0, 4, number(name)), (_LOAD, 0, 0, 16), (_EQUAL, 1, 0, own), deny]
             steps += [(_LOAD, 0, 0, 0)]
+    # A fork would outlive the command; a datagram goes to any address, whatever its pair.
+    most = len(_REFUSED_CONTROLS)
+    alone = [] if starts else [(_ANY_BIT, 1, 0, _THREAD), deny]
     steps += [
-        *((_EQUAL, 0, 3, number("clone")), (_LOAD, 0, 0, 16), (_ANY_BIT, 0, 1, _NEW_NAMESPACES)),
-        *(deny, (_LOAD, 0, 0, 0)),
-        *((_EQUAL, 0, 4, number("ioctl")), (_LOAD, 0, 0, 24)),
-        *((_EQUAL, 1, 0, _INJECTING[0]), (_EQUAL, 0, 1, _INJECTING[1]), deny),
-        (_RETURN, 0, 0, _ALLOW),
+        *((_EQUAL, 0, 3 + len(alone), number("clone")), (_LOAD, 0, 0, 16)),
+        *((_ANY_BIT, 0, 1, _NEW_NAMESPACES), deny, *alone, (_LOAD, 0, 0, 0)),
+        *((_EQUAL, 0, 5, number("socketpair")), (_LOAD, 0, 0, 16), (_EQUAL, 0, 2, _LOCAL)),
+        *((_LOAD, 0, 0, 24), (_ANY_BIT, 0, 1, _NO_STREAM), deny, (_LOAD, 0, 0, 0)),
+        *((_EQUAL, 0, 1 + most, number("ioctl")), (_LOAD, 0, 0, 24)),
+        *((_EQUAL, most - index, 0, call) for index, call in enumerate(_REFUSED_CONTROLS)),
+        *((_RETURN, 0, 0, _ALLOW), deny),
     ]
     return steps
 

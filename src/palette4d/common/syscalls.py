@@ -17,10 +17,15 @@ _NUMBERS = {
     "clone": (56, 220),
     "clone3": (435, 435),
     "ioctl": (16, 29),
+    "capget": (125, 90),
+    "capset": (126, 91),
+    "socketpair": (53, 199),
     # with a process of one's own as the first argument
     "tgkill": (234, 131),
     "prlimit64": (302, 261),
-    # programs and signals
+    # processes, programs and signals
+    "fork": (57, -1),
+    "vfork": (58, -1),
     "execve": (59, 221),
     "execveat": (322, 281),
     "kill": (62, 129),
@@ -45,9 +50,18 @@ _NUMBERS = {
     "pidfd_getfd": (438, 438),
     "kcmp": (312, 272),
     "shmget": (29, 194),
+    "shmat": (30, 196),
+    "shmctl": (31, 195),
     "msgget": (68, 186),
+    "msgsnd": (69, 189),
+    "msgrcv": (70, 188),
+    "msgctl": (71, 187),
     "semget": (64, 190),
+    "semop": (65, 193),
+    "semtimedop": (220, 192),
+    "semctl": (66, 191),
     "mq_open": (240, 180),
+    "mq_unlink": (241, 181),
     # rights, owners, times and attributes of files, which Landlock leaves alone
     "chmod": (90, -1),
     "fchmod": (91, 52),
@@ -65,6 +79,7 @@ _NUMBERS = {
     "fremovexattr": (199, 16),
     "setxattrat": (463, 463),
     "removexattrat": (466, 466),
+    "file_setattr": (469, 469),
     "utime": (132, -1),
     "utimes": (235, -1),
     "futimesat": (261, -1),
@@ -109,7 +124,7 @@ _NUMBERS = {
 _NAMES = tuple(_NUMBERS)
 
 #: What starts a program, or ends one: for processes that start some.
-STARTS = _NAMES[_NAMES.index("execve") : _NAMES.index("socket")]
+STARTS = _NAMES[_NAMES.index("fork") : _NAMES.index("socket")]
 
 #: What no confined process may do.
 REFUSED = _NAMES[_NAMES.index("socket") :]

@@ -167,7 +167,7 @@ def _serve(promise: Promise, requests: IO[str], answers: IO[bytes]) -> None:
         def do(what: str, *arguments: Any) -> None:
             if what == "place" and folder is not None:
                 name, path, force = arguments
-                _place(folder / Path(name).name, Path(path), force, promise)
+                _place(_taken(folder, name), Path(path), force, promise)
             elif what == "make_folder" and promise.leads_to(Path(arguments[0])):
                 files.make_folder(Path(arguments[0]))
             elif what == "lock" and promise.holds(Path(arguments[0])):
@@ -196,23 +196,32 @@ def _send(answers: IO[bytes], found: object, error: Exception | None = None) -> 
 
 
 def _own_folder(promise: Promise, stack: contextlib.ExitStack) -> Path | None:
-    """Return a folder on the disk of the promise; None where none can be made."""
+    """Return a folder on the disk of the promise; None where none can be made.
+
+    It lies in another one, in which the command can change nothing.
+    """
     parent = (promise.linked or promise.folder / "file").absolute().parent
     while not parent.is_dir() and parent != parent.parent:
         parent = parent.parent
     try:
-        return stack.enter_context(files.temporary_folder(parent))
+        folder = stack.enter_context(files.temporary_folder(parent)) / "out"
+        folder.mkdir()
+        return folder
     except OSError:
         return None  # the write says so
 
 
-def _place(temporary: Path, path: Path, force: bool, promise: Promise) -> None:
-    if not promise.holds(path) or not stat.S_ISREG(temporary.lstat().st_mode):
+def _taken(folder: Path, name: str) -> Path:
+    """Return a file of the command's folder, where the command can no longer exchange it."""
+    return (folder / Path(name).name).rename(folder.parent / "taken")
+
+
+def _place(taken: Path, path: Path, force: bool, promise: Promise) -> None:
+    if not promise.holds(path) or not stat.S_ISREG(taken.lstat().st_mode):
         raise _unasked(path)
     with files.replacing(path, force=force) as own:
-        if path.exists():
-            temporary.chmod(0o600)  # until it has the rights of the old file
-        shutil.move(temporary, own)
+        taken.chmod(stat.S_IMODE(own.stat().st_mode))  # its maker may have made it setuid
+        shutil.move(taken, own)
 
 
 def _unasked(*what: object) -> Palette4dError:
