@@ -10,6 +10,18 @@ from pathlib import Path
 from palette4d.common.errors import Palette4dError
 
 
+class NoAnswer:
+    """What is sent and cannot be received."""
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return int, ("no number",)
+
+
+def lie(value: int, threads: int) -> object:
+    """Square a number, but answer 2 with what cannot be received, and 3 with nothing."""
+    return NoAnswer() if value == 2 else None if value == 3 else value * value
+
+
 def piece(value: int, threads: int) -> tuple[int, int]:
     """Square a number; refuse 3, fall over 4, let 5 end the process, and never reach 7."""
     if value == 3:

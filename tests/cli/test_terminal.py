@@ -1,6 +1,8 @@
 """Names from files do not act on the terminal, whichever verb prints them."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -69,3 +71,19 @@ def test_a_name_in_a_progress_bar_is_printable(
     printed = capsys.readouterr().err
     assert r"\u001b[2J" in printed
     assert all(c.isprintable() for c in printed.replace("\r", "").replace("\n", ""))
+
+
+def test_a_fault_of_the_program_does_not_let_a_name_through() -> None:
+    program = (
+        "import sys\n"
+        "from palette4d.cli import info, main\n"
+        "def broken(*_): raise RuntimeError('a name \\x1b]0;owned\\x07')\n"
+        "info.run = broken\n"
+        "sys.argv = ['palette4d', 'info', 'x.p4d.json']\n"
+        "sys.exit(main.main())\n"
+    )
+    command = [sys.executable, "-P", "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "RuntimeError: a name \\u001b]0;owned\\u0007" in done.stderr
+    assert "\x1b" not in done.stderr

@@ -17,7 +17,7 @@ from any_clips import landscape
 from distributed import Client
 from edits import clip, external, movie, save, timeline
 from farm_processes import Farm, farm, wait_for
-from pieces import noted, piece
+from pieces import lie, noted, piece
 from without_module import run_without
 
 from palette4d.cli import main
@@ -203,6 +203,15 @@ def test_a_worker_with_several_threads_does_one_piece_at_a_time(tmp_path: Path) 
         found: dict[int, object] = {}
         tasks = {i: i for i in (1, 2, 3, 6, 7)}
         Workers(cluster=made.address).run(piece, tasks, found.__setitem__)
+        told: dict[int, object] = {}
+
+        def take(key: int, answer: object) -> None:
+            told[key] = answer.text if isinstance(answer, Failed) else int(answer)  # type: ignore
+
+        Workers(cluster=made.address).run(lie, {i: i for i in (1, 2, 3, 4)}, take)
+    assert (told[1], told[4]) == (1, 16)
+    assert "ValueError" in str(told[2])
+    assert "TypeError" in str(told[3])
     endless = found.pop(7)  # Dask cannot send such an error
     assert isinstance(endless, Failed)
     assert "RecursionError" in endless.text

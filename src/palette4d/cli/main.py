@@ -9,6 +9,7 @@ import contextlib
 import importlib
 import os
 import sys
+import traceback
 from collections.abc import Callable, Sequence
 
 from palette4d._core import __version__
@@ -118,7 +119,10 @@ def _run(args: argparse.Namespace, stack: contextlib.ExitStack) -> int:
         return 130
     except Exception as error:
         job.event(error=[job.shown(str(error) or type(error).__name__)])
-        raise
+        if not args.confine:
+            raise
+        traceback.print_exc()  # while names that it quotes are printable
+        return 1
     return status
 
 

@@ -95,7 +95,7 @@ def run(
         try:
             for future, found in _finished(client, futures, address):
                 with later_interrupts():
-                    take(keys.pop(future.key), found)
+                    _take(take, keys.pop(future.key), found)
                 future.release()  # results may be large
             deserted = Failed(
                 f"the farm has had no worker for {WORKERS_WITHIN} seconds (too little memory?); "
@@ -107,6 +107,21 @@ def run(
         finally:
             with contextlib.suppress(Exception):  # the scheduler may have gone
                 client.cancel(futures)
+
+
+def _take(take: Callable[[Key, Any], None], key: Key, found: Any) -> None:
+    """Call `take` with an answer; one of another type costs its task alone."""
+    try:
+        take(key, found)
+    except (TypeError, ValueError, AttributeError, LookupError, RecursionError) as error:
+        take(key, _unusable(error))
+
+
+def _unusable(error: BaseException) -> Failed:
+    return Failed(
+        f"a worker's answer cannot be used ({type(error).__name__}: {error}); check that workers "
+        "have the same packages as this computer, and run the same command again"
+    )
 
 
 # One task at a time in a process: the task uses all threads of the worker.
@@ -211,6 +226,10 @@ def _outcome(client: Any, future: Any) -> Any:
         )
     except (concurrent.futures.CancelledError, asyncio.CancelledError):
         return Failed("the farm's scheduler went away; run the same command again")
+    except _LostError:
+        raise
+    except Exception as error:  # one that `_piece` did not raise, or an answer that is no pickle
+        return _unusable(error)
 
 
 @contextlib.contextmanager
