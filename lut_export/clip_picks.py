@@ -24,10 +24,16 @@ TOLERANCE = 4e-6
 
 @dataclass(frozen=True)
 class PickConstants:
-    """The constants: (frames, numbers) tables at some frames, still grids and their values."""
+    """The constants.
+
+    At some frames (`times`) there is a table. Its number i is column columns[i] of `tables`, which
+    changes, or number -1 - columns[i] of `fixed`. `stills` are the grids, `values` theirs.
+    """
 
     times: list[float]
-    tables: F64
+    tables: F64  #: (times, columns)
+    columns: list[int]
+    fixed: list[float]
     stills: list[int]
     values: list[float]
     bits: int  #: of a code in the still grids
@@ -35,7 +41,7 @@ class PickConstants:
     @property
     def table_size(self) -> int:
         """Bytes without grids and values."""
-        return 4 * (len(self.times) + self.tables.size)
+        return 4 * (len(self.times) + self.tables.size + len(self.columns) + len(self.fixed))
 
     @property
     def size(self) -> int:
@@ -74,7 +80,19 @@ def pick_constants(
         table[:, DISPLAY : DISPLAY + 4] = count, len(values), start, scale
         values += samples
     keys = _keys(np.asarray(times), table)
-    return PickConstants([times[key] for key in keys], table[keys], stills, values, bits)
+    moving = np.ptp(table, axis=0) > 0
+    moving[0] |= not moving.any()  # no array is empty
+    fixed, places = np.unique(table[0], return_inverse=True)
+    columns = np.where(moving, np.cumsum(moving) - 1, -1 - places)
+    return PickConstants(
+        [times[key] for key in keys],
+        table[np.ix_(keys, moving)],
+        columns.tolist(),
+        fixed.tolist(),
+        stills,
+        values,
+        bits,
+    )
 
 
 Curve = tuple[int, float, float, list[float]]
@@ -125,11 +143,11 @@ def _row(
 
 
 def _node(point: Sequence[float]) -> list[float]:
-    """Return the node below a point, as `MatteGrid::place` finds it."""
+    """Return the node below a point, as `MatteGrid::place` finds it, and 1/4, to round down."""
     per = 95 / 1.4
     scaled = [(point[0] + 0.7) * per, (point[1] + 0.7) * per, point[2] * 15]
     return [
-        float(min(int(min(max(x, 0.0), last)), last - 1))
+        min(int(min(max(x, 0.0), last)), last - 1) + 0.25
         for x, last in zip(scaled, (95, 95, 15), strict=True)
     ]
 

@@ -108,7 +108,12 @@ def clip_text(
     levels, picks = _picks(sidecar, times, room, output, textures=textures)
     texture, texts = None, [_core.kernel_text("clip")]
     if picks is not None:
-        arrays |= {"p4d_pick_times": picks.times, "p4d_pick_tables": picks.tables.ravel().tolist()}
+        arrays |= {
+            "p4d_pick_times": picks.times,
+            "p4d_pick_tables": picks.tables.ravel().tolist(),
+            "p4d_pick_columns": picks.columns,
+            "p4d_pick_fixed": picks.fixed,
+        }
         if textures:
             texture = picks.texture
             read = "p4d_word(i)", f"intBitsToFloat(p4d_word({len(picks.stills)} + (i)))"
@@ -118,7 +123,7 @@ def clip_text(
         defines += [
             "#define P4D_TABLE int t_, int n_, float w_,",
             "#define P4D_PASS t_, n_, w_,",
-            "#define P4D_T(i) p4d_timed(t_ + (i), n_ + (i), w_)",
+            "#define P4D_T(i) p4d_timed(i, t_, n_, w_)",
             f"#define P4D_S(i) {read[0]}",
             f"#define P4D_G(i) {read[1]}",
             f"#define P4D_BITS {picks.bits}",
@@ -176,8 +181,12 @@ def _size(arrays: dict[str, Numbers]) -> int:
 
 
 _TIMED = """
-P4D_FN float p4d_timed(int now, int next, float w) {
-    float a = p4d_pick_tables[now], b = p4d_pick_tables[next];
+P4D_FN float p4d_timed(int i, int now, int next, float w) {
+    int column = p4d_pick_columns[i];
+    float a, b;
+    if (column < 0) return p4d_pick_fixed[-1 - column];
+    a = p4d_pick_tables[now + column];
+    b = p4d_pick_tables[next + column];
     return a + w * (b - a);
 }
 """

@@ -37,9 +37,9 @@ _SAMPLER = """\
 // The file .rgba beside this one: RGBA, 8 bits, {width} x {height}, not filtered, not converted.
 uniform highp sampler2D p4d_mattes;
 """
-#: mpv counts the frames that it shows; it does not tell the clip's own.
+#: mpv counts the frames that it shows, from 1; it does not tell the clip's own.
 _HOOK = """\
-// mpv --glsl-shader=FILE CLIP: play from the start, without seeking.
+// mpv --framedrop=no --glsl-shader=FILE CLIP: play from the start, without seeking.
 {texture}//!HOOK MAIN
 //!BIND HOOKED
 {bind}//!DESC palette4d: {name}
@@ -48,7 +48,7 @@ _HOOK = """\
 {body}
 vec4 hook() {{
     vec4 colour = HOOKED_tex(HOOKED_pos);
-    p4d_rgb c = p4d_at_strength(P4D_HOOK_FIRST + float(frame), P4D_HOOK_STRENGTH,
+    p4d_rgb c = p4d_at_strength(P4D_HOOK_FIRST + float(frame - 1), P4D_HOOK_STRENGTH,
                                 colour.r, colour.g, colour.b);
     return vec4(c.r, c.g, c.b, colour.a);
 }}

@@ -203,6 +203,8 @@ def test_a_dctl_is_one_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     [
         (("--dctl", "a.dctl", "--every", "1"), "--dctl"),
         (("--dctl", "a.dctl", "--size", "9"), "--dctl"),
+        (("--dctl", "a.dctl", "--strength", "0.5"), "--dctl"),
+        (("--glsl", "a.glsl", "--format", "clf"), "--glsl"),
         (("--dctl", "a.dctl", "--glsl", "a.glsl"), "--glsl"),
         (("--every", "1", "-o", "luts", "--alpha"), "--dctl"),
         (("--every", "1"), "--output"),

@@ -32,7 +32,7 @@ F32 = NDArray[np.float32]
 NAMES = ["changes-smooth", "changes-stops", "changes-hold", "flat-edited", "grey-edited",
          "colour-edited", "still-edited"]  # fmt: skip
 PICKS = ["still-picks", "still-holds", "still-learned", "colour-picks", "colour-curve",
-         "changes-picks", "changes-holds"]  # fmt: skip
+         "changes-picks", "changes-holds", "changes-learned"]  # fmt: skip
 
 #: What Resolve puts before a DCTL for OpenCL, and the flags that it builds with.
 OPENCL_HOST = """
@@ -205,6 +205,15 @@ def test_smooth_ramps_need_few_keys(tmp_path: Path) -> None:
         for ramp in ("linear", "smooth")
     )  # fmt: skip
     assert smooth.keys <= straight.keys + 2 < 20
+
+
+def test_what_picks_keep_through_time_is_stored_once(tmp_path: Path) -> None:
+    # Three picks, of which one follows its colour.
+    some, more = (
+        exported(DOCUMENTS["changes-picks"], tmp_path, frames=f"1-{last}")[1].constant_bytes
+        for last in (10, 20)
+    )
+    assert some < more < some + 10 * 200
 
 
 def test_a_range_of_frames_is_smaller(colours: F32, tmp_path: Path) -> None:

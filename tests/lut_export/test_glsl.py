@@ -25,7 +25,7 @@ uniform sampler2D source;
 out vec4 result;
 void main() { result = palette4d(texelFetch(source, ivec2(gl_FragCoord.xy), 0)); }
 """
-#: What mpv puts before a user shader, and around it.
+#: What mpv puts before a user shader, and around it; its `frame` is 1 at the first frame.
 MPV = """
 uniform sampler2D p4d_mattes;
 uniform sampler2D source;
@@ -79,6 +79,7 @@ def blocks(hook: str) -> list[tuple[list[str], str]]:
         # llvmpipe takes some seconds to compile each.
         pytest.param("colour-curve", marks=pytest.mark.slow),
         pytest.param("changes-holds", marks=pytest.mark.slow),
+        pytest.param("changes-learned", marks=pytest.mark.slow),
     ],
 )
 def test_the_function_draws_what_render_does(name: str, pixels: F32, tmp_path: Path) -> None:
@@ -122,7 +123,7 @@ def test_the_shader_of_mpv_counts_from_the_first_frame(pixels: F32, tmp_path: Pa
     assert all(line.startswith("//") for line in text[: text.index("//!HOOK")].splitlines())
     first = document["polytope"]["blocks"][0]["first"]
     for shown in (0, 12):
-        around = f"#version 330\n{MPV}const int frame = {shown};\n"
+        around = f"#version 330\n{MPV}const int frame = {shown + 1};\n"
         found = gl.run(around + text + MPV_MAIN, pixels, {})
         expected = exact(document, first + shown, pixels[:, :3])
         assert np.abs(found[:, :3] - expected).max() < PROMISE
@@ -140,7 +141,7 @@ def test_the_shader_of_mpv_has_its_texture(pixels: F32, tmp_path: Path) -> None:
     # mpv wants one line, and neither more nor fewer bytes.
     picks = np.frombuffer(bytes.fromhex(data.removesuffix("\n")), np.uint8)
     picks = picks.reshape(height, width, 4)
-    around = f"#version 330\n{MPV}const int frame = 0;\n"
+    around = f"#version 330\n{MPV}const int frame = 1;\n"
     found = gl.run(around + shader + MPV_MAIN, pixels, {}, picks)
     first = document["polytope"]["blocks"][0]["first"]
     assert np.abs(found[:, :3] - exact(document, first, pixels[:, :3])).max() < PROMISE

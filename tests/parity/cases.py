@@ -299,6 +299,14 @@ def picked_documents() -> dict[str, Document]:
              hold("kept", (0.2, 0.5, 0.3), matte="c")],
             {"a": learned_odds(1), "b": learned_odds(2), "c": learned_odds(3)},
         ),
+        # Where a hold is whole, nothing is left of both picks.
+        "changes-learned": picked(
+            changes,
+            [{**red, "matte": "a"}, {**green, "matte": "b", "softness": 0.2, "reach": -0.7},
+             hold("kept", (0.2, 0.5, 0.3), matte="c",
+                  path=[(0, (0.2, 0.5, 0.3), 1), (20, (0.5, 0.4, 0.6), 1)])],
+            {"a": learned_odds(1), "b": learned_odds(2), "c": learned_odds(3)},
+        ),
         "colour-picks": picked(colour, [moving, black, fading]),
         "colour-curve": picked(colour, [red, fading], None, (-0.25, 1.5, log)),
         "changes-picks": picked(

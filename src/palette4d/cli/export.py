@@ -154,8 +154,9 @@ def _one_file(args: argparse.Namespace) -> int:
     from palette4d.lut_export.glsl import export_glsl
 
     name = "--glsl" if args.dctl is None else "--dctl"
-    others = ("output", "every", "otio", "name", "clip", "size")
-    if args.stops or any(getattr(args, other) is not None for other in others):
+    of_series = {*export_settings(args), "output", "name", "padding", "otio", "ccc", "edl"}
+    others = of_series - {"frames", "force"}
+    if any(vars(args)[other] != args.parser.get_default(other) for other in others):
         args.parser.error(f"{name}: only with --frames, --force, --json and --quiet")
     if args.glsl is None:
         done = export_dctl(
@@ -177,9 +178,9 @@ def _one_file(args: argparse.Namespace) -> int:
     if done.matte_levels:
         about = (
             f"the mattes of picks have {done.matte_levels} values, to have room: code values are "
-            f"off by up to {done.error:.2g}"
+            f"off by up to {done.error:.2g}; fewer picks, or frames, leave more room"
         )
-        tell(args, "note", about)
+        tell(args, "warning", about)
     return 0
 
 
