@@ -39,7 +39,7 @@ uniform highp sampler2D p4d_mattes;
 """
 #: mpv counts the frames that it shows, from 1; it does not tell the clip's own.
 _HOOK = """\
-// mpv --framedrop=no --glsl-shader=FILE CLIP: play from the start, without seeking.
+// mpv --vo=gpu --framedrop=no --glsl-shader=FILE CLIP: play from the start, without seeking.
 {texture}//!HOOK MAIN
 //!BIND HOOKED
 {bind}//!DESC palette4d: {name}

@@ -27,6 +27,7 @@ OPTIONS = (
 def source() -> str:
     """The kernel in CUDA's dialect, as CMake puts it together."""
     parts = [
+        "buffers",
         "layout",
         "face",
         "palette",

@@ -77,7 +77,7 @@ bool renders_on_gpus(const Suites& suites) {
 void define_gpu_param(ParamDefiner& define) {
     define.choice({kParamGpu, "GPU",
                    "Auto: draws on the GPU where the host has its pictures there, within 0.0001 of "
-                   "Exact. Off: copies them to the processor and back, and draws as Mode says. "
+                   "the processor. Off: copies them to the processor and back, and draws there. "
                    "Status names the device."},
                   {"Auto", "Off"});
 }

@@ -10,7 +10,7 @@
 
 namespace test {
 
-/// Of *Exact*, in code values.
+/// Of the processor's pictures, in code values.
 constexpr double kPromise = 1e-4;
 
 /// The devices of this machine, each in a context of its own.

@@ -10,10 +10,6 @@
 #define P4D_INT(x) static_cast<int>(x)
 #define P4D_FLOAT(x) static_cast<float>(x)
 #define P4D_TABLE [[maybe_unused]] const float *t_, [[maybe_unused]] const float *g_,
-#define P4D_PASS t_, g_,
-#define P4D_T(i) t_[i]
-#define P4D_CURVES P4D_TABLE
-#define P4D_C(i) P4D_G(i)
 #define P4D_G(i) g_[i]
 #define P4D_SQRT std::sqrt
 #define P4D_ATAN2 std::atan2
@@ -24,10 +20,7 @@
 #define P4D_EXP2 std::exp2
 #define P4D_POW std::pow
 #define P4D_SOURCE const float *in_, int row_,
-#define P4D_IN(x, y, c) in_[(y) * row_ + 4 * (x) + (c)]
 #define P4D_SCRATCH [[maybe_unused]] float *s_,
-#define P4D_SCRATCH_PASS s_,
-#define P4D_CELL(i) s_[i]
 #include PALETTE4D_KERNEL
 
 /// An image of RGBA pixels; `scratch` has room for the planes of the table's cells.

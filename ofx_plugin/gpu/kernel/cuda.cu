@@ -4,10 +4,6 @@
 #define P4D_INT(x) ((int)(x))
 #define P4D_FLOAT(x) ((float)(x))
 #define P4D_TABLE const float *__restrict__ t_, const float *__restrict__ g_,
-#define P4D_PASS t_, g_,
-#define P4D_T(i) t_[i]
-#define P4D_CURVES P4D_TABLE
-#define P4D_C(i) P4D_G(i)
 #define P4D_G(i) __ldg(g_ + (i))
 #define P4D_SQRT sqrtf
 #define P4D_ATAN2 atan2f
@@ -18,10 +14,7 @@
 #define P4D_EXP2 exp2f
 #define P4D_POW powf
 #define P4D_SOURCE const float *in_, long long row_,
-#define P4D_IN(x, y, c) in_[(y) * row_ + 4 * (x) + (c)]
 #define P4D_SCRATCH float *s_,
-#define P4D_SCRATCH_PASS s_,
-#define P4D_CELL(i) s_[i]
 @P4D_FRAME@
 /* As in opencl.cl. */
 #define P4D_ARGUMENTS                                                                              \

@@ -5,10 +5,6 @@
 #define P4D_INT(x) int(x)
 #define P4D_FLOAT(x) float(x)
 #define P4D_TABLE constant const float *t_, device const float *g_,
-#define P4D_PASS t_, g_,
-#define P4D_T(i) t_[i]
-#define P4D_CURVES P4D_TABLE
-#define P4D_C(i) P4D_G(i)
 #define P4D_G(i) g_[i]
 #define P4D_SQRT metal::sqrt
 #define P4D_ATAN2 metal::atan2
@@ -19,10 +15,7 @@
 #define P4D_EXP2 metal::exp2
 #define P4D_POW metal::pow
 #define P4D_SOURCE device const float *in_, int row_,
-#define P4D_IN(x, y, c) in_[(y) * row_ + 4 * (x) + (c)]
 #define P4D_SCRATCH device float *s_,
-#define P4D_SCRATCH_PASS s_,
-#define P4D_CELL(i) s_[i]
 @P4D_FRAME@
 struct p4d_image { int in_start, in_row, out_start, out_row, width, height, x1, y1, x2, y2; };
 

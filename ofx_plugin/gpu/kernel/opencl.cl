@@ -5,10 +5,6 @@
 #define P4D_INT(x) ((int)(x))
 #define P4D_FLOAT(x) ((float)(x))
 #define P4D_TABLE __constant const float *t_, __global const float *g_,
-#define P4D_PASS t_, g_,
-#define P4D_T(i) t_[i]
-#define P4D_CURVES P4D_TABLE
-#define P4D_C(i) P4D_G(i)
 #define P4D_G(i) g_[i]
 #define P4D_SQRT sqrt
 #define P4D_ATAN2 atan2
@@ -19,10 +15,7 @@
 #define P4D_EXP2 exp2
 #define P4D_POW pow
 #define P4D_SOURCE __global const float *in_, int row_,
-#define P4D_IN(x, y, c) in_[(y) * row_ + 4 * (x) + (c)]
 #define P4D_SCRATCH __global float *s_,
-#define P4D_SCRATCH_PASS s_,
-#define P4D_CELL(i) s_[i]
 @P4D_FRAME@
 /* All kernels take the same. A window of RGBA pixels: its pixel (x, y) is at `*_start` + y * `*_row` +
    4 x, in floats; the source covers [x1, x2) x [y1, y2) of it. */
