@@ -16,7 +16,9 @@ Picture = NDArray[Any]  # (h, w, 3 or 4) float32 or uint8
 
 def described(driver: Path, bundle: Path) -> dict[str, dict[str, Any]]:
     """The parameters that the node describes, by their names (`describe_json.hpp`)."""
-    done = subprocess.run([driver, "describe", bundle], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [driver, "describe", bundle], capture_output=True, encoding="utf-8", check=False
+    )
     assert done.returncode == 0, done.stderr
     parameters: dict[str, dict[str, Any]] = json.loads(done.stdout)
     return parameters
@@ -45,7 +47,7 @@ class StrictNode:
                 *(*map(str, options), source, output),
             ],
             capture_output=True,
-            text=True,
+            encoding="utf-8",
             check=False,
         )
         assert done.returncode == 0, done.stderr

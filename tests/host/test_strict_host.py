@@ -97,7 +97,7 @@ def test_the_driver_says_what_is_wrong(strict_host: Path, bundle: Path, tmp_path
             *(tmp_path / "in.raw", tmp_path / "out.raw"),
         ],
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
     )
     assert done.returncode == 1
