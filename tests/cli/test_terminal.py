@@ -12,6 +12,7 @@ from palette4d.cli.main import main
 from palette4d.cli.progress import frames_bar
 
 EDITED = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_edited.p4d.json"
+PICKS = EDITED.with_name("v2_picks.p4d.json")
 
 #: Forges a line and a patch of colour, overwrites a line, sets the window's title, clears the
 #: screen, turns the writing around.
@@ -71,6 +72,20 @@ def test_a_name_in_a_progress_bar_is_printable(
     printed = capsys.readouterr().err
     assert r"\u001b[2J" in printed
     assert all(c.isprintable() for c in printed.replace("\r", "").replace("\n", ""))
+
+
+@pytest.mark.parametrize("words", ["history", "version list", "undo"])
+def test_steps_and_notes_begin_no_line(
+    words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document: dict[str, Any] = json.loads(PICKS.read_text(encoding="utf-8"))
+    document["history"]["done"][-1]["step"] = document["versions"][0]["note"] = f"a\n{FORGED}"
+    path = tmp_path / "hostile.p4d.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    assert main(["edit", str(path), *words.split()]) == 0
+    printed = capsys.readouterr().out
+    assert FORGED in printed
+    assert not any(line.startswith(FORGED) for line in printed.splitlines())
 
 
 def test_a_fault_of_the_program_does_not_let_a_name_through() -> None:

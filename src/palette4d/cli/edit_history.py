@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from palette4d import load
 from palette4d.common.arguments import whole
 from palette4d.common.errors import Palette4dError
-from palette4d.common.text import counted
+from palette4d.common.text import counted, on_lines
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -82,7 +82,7 @@ def run_undo(args: argparse.Namespace) -> int:
     steps = [document.undo() for _ in range(args.steps)]
     document.save()
     for step in steps:
-        print(f"undone: {step.label}")
+        print(on_lines(f"undone: {step.label}"))
     return 0
 
 
@@ -93,7 +93,7 @@ def run_redo(args: argparse.Namespace) -> int:
     steps = [document.redo() for _ in range(args.steps)]
     document.save()
     for step in steps:
-        print(f"done again: {step.label}")
+        print(on_lines(f"done again: {step.label}"))
     return 0
 
 
@@ -113,7 +113,7 @@ def run_history(args: argparse.Namespace) -> int:
     for number, step in enumerate((*done, *reversed(undone)), 1):
         unread = "  (not followed yet)" if step.unread else ""
         note = "" if number <= len(done) else "  (undone)"
-        print(f"{number:>4}  {step.label}{unread}{note}")
+        print(on_lines(f"{number:>4}  {step.label}{unread}{note}"))
     if not done and not undone:
         print("no steps")
     return 0
@@ -127,7 +127,7 @@ def run_version(args: argparse.Namespace) -> int:
         for name in document.grade.versions:
             mark = "*" if name in active else " "
             note = document.grade.note(name)
-            print(f"{mark} {name}: {note}" if note else f"{mark} {name}")
+            print(on_lines(f"{mark} {name}: {note}" if note else f"{mark} {name}"))
         if not document.grade.versions:
             print("no versions")
         return 0

@@ -16,10 +16,6 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import av
-from av.codec.codec import Capabilities
-from av.error import FFmpegError
-
 from palette4d import _core
 from palette4d.common.arguments import parse_frames
 from palette4d.media.clip_base import (
@@ -46,6 +42,7 @@ from palette4d.media.movie_pixels import (
     upright,
 )
 from palette4d.media.movie_stated import stated_by
+from palette4d.media.pyav import Capabilities, FFmpegError, av
 
 #: Pictures whose decoding takes longer than opening the file again for a seek.
 WORTH_SEEKING = 4

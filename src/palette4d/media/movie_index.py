@@ -7,14 +7,13 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import av
 import numpy as np
-from av.error import FFmpegError
 
 from palette4d.common.arguments import MAX_FRAMES
 from palette4d.media.clip_base import ClipError
 from palette4d.media.movie_boxes import boxes
 from palette4d.media.movie_length import is_cut_short, promised_frames
+from palette4d.media.pyav import FFmpegError, av
 
 #: FFmpeg's names of the formats of `MOVIE_EXTENSIONS`. It recognises formats by content, and
 #: playlists such as ffconcat or HLS would lead it to other files.

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from typing import Any, cast
 
-import av
 import numpy as np
-from av.sidedata.sidedata import Type
 from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.media.clip_base import F32, all_hidden
 from palette4d.media.colour_tags import LUMA_WEIGHTS
+from palette4d.media.pyav import Type, av
 
 _LIMITED_RANGE, FULL_RANGE = 1, 2
 _GREYS = ("gray", "gray10le", "gray12le", "gray16le")

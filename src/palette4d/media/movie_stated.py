@@ -7,15 +7,12 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import av
 import numpy as np
-from av.error import FFmpegError
-from av.filter import Graph
-from av.sidedata.sidedata import Type
 
 from palette4d.media.colour_tags import ColourTags
 from palette4d.media.movie_boxes import boxes
 from palette4d.media.movie_pixels import FULL_RANGE, is_luma_chroma, side_data, turn
+from palette4d.media.pyav import FFmpegError, Graph, Type, av
 from palette4d.media.stated import Fields, Stated
 from palette4d.media.timecode import nominal
 

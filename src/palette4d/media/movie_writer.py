@@ -14,10 +14,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import av
 import numpy as np
-from av.error import FFmpegError
-from av.filter import Graph
 from numpy.typing import NDArray
 
 from palette4d.common.files import replacing
@@ -26,6 +23,7 @@ from palette4d.media.clip_base import F32, strips
 from palette4d.media.codecs import Codec, codec_for
 from palette4d.media.colour_tags import LUMA_WEIGHTS, UNKNOWN
 from palette4d.media.frame_writer import OutputError, with_alpha_of
+from palette4d.media.pyav import FFmpegError, Graph, av
 from palette4d.media.sound import Sound
 from palette4d.media.stated import Stated
 

@@ -13,11 +13,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import av
-from av.error import FFmpegError
-
 from palette4d.media.clip_movie import MovieClip
 from palette4d.media.movie_index import opened_movie
+from palette4d.media.pyav import FFmpegError, av
 
 _LAYOUTS = {1: "mono", 2: "stereo", 6: "5.1", 8: "7.1"}
 
