@@ -13,11 +13,12 @@ from palette4d.cli.swatches import shown, swatch
 from palette4d.cli.terminal import tell
 from palette4d.common.arguments import ColourAction, number, whole
 from palette4d.common.errors import Palette4dError
-from palette4d.common.text import counted, hex_of
+from palette4d.common.text import counted, hex_of, percent
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
+    from palette4d.grade.answer import Note
     from palette4d.grade.document import Document
     from palette4d.grade.picks import Pick
 
@@ -363,8 +364,27 @@ def _print_pick(
     found = next(pick for pick in document.grade.picks if pick.id == id_)
     print(_told(document, found, followed))
     answer = document.answer(id_, clip) if found.enabled else None
-    for line in () if answer is None else answer.lines():
-        print(f"  {line}")
+    if answer is not None:
+        verb = "takes" if answer.kind == "pick" else "keeps"
+        print(f"  {verb} {percent(answer.share)} of frame {answer.frame}")
+        for line in (line for note in answer.notes for line in _noted(note)):
+            print(f"  {line}")
+
+
+def _noted(note: Note) -> Iterator[str]:
+    """Yield a note of an answer, and its gesture as arguments of `edit`."""
+    text, place = "warning: " * note.warns + note.words, note.place
+    if place is None:
+        yield text
+        return
+    pixel = f"{place.pixel[0]},{place.pixel[1]}"
+    yield f"{text}: {hex_of(place.rgb)} at {pixel}"
+    if note.gesture:
+        what = "to keep it: hold"
+        if note.gesture == "area":
+            what = f"if it belongs to the thing: area {note.id}"
+        where = f"--frame {place.frame} --pixel {pixel} --box {place.box}"
+        yield f"  {what} {where} ({note.effect})"
 
 
 def _told(document: Document, pick: Pick, followed: bool = False) -> str:

@@ -76,7 +76,11 @@ def option_of(arg: Arg, parser: argparse.ArgumentParser) -> str:
         if action.const is not None and action.const == arg.value:
             return action.option_strings[-1]
     flags = [flag for action in ours for flag in action.option_strings if flag.startswith("--")]
-    flag = flags[-1 if arg.value is False else 0] if flags else f"--{name.replace('_', '-')}"
+    flag = (
+        flags[-1 if arg.value is False else 0]
+        if flags
+        else f"--{'no-' * (value == 'False')}{name.replace('_', '-')}"
+    )
     return f"{flag} {value}".rstrip()
 
 

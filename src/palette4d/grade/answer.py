@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
-from palette4d.common.text import hex_of, percent
-from palette4d.grade import pick_edits
-from palette4d.grade.clip_of_picks import ClipOfPicks, largest_part
+from palette4d.common.text import percent
+from palette4d.grade import pick_edits, thing
+from palette4d.grade.clip_of_picks import SAME_COLOUR, ClipOfPicks, largest_part
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.grade import Grade
 from palette4d.grade.pick_edits import When
@@ -33,22 +33,15 @@ WIDTH = 480
 #: Least share of the change of a pixel that counts as taken. A marked pixel with less than LEAST is
 #: reported: pale parts of a thing change a little.
 TAKEN, LEAST = 0.25, 0.05
-#: Least shares of the frame to report: of other things that are taken, and of a part of the thing
-#: that is not. Smaller areas are seldom seen.
-OTHERS, PART = 0.005, 0.01
-#: A proposed box may add at most this many times the part that it is for; more is a flood.
-MULTIPLIES = 1.3
-#: Largest share of the picked thing that a hold may cost unreported; a proposed one, half of it.
+#: Least share of the frame of other things to report. Smaller areas are seldom seen.
+OTHERS = 0.005
+#: Largest share of the change of a thing, and of what was marked, that a hold may cost unreported.
 COST = 0.1
 #: A pick that takes more than this share of the pixels of another pick is reported.
 SHARED = 0.2
 #: A taken colour farther than this from the line of the picked hue, in pick space, has another hue:
 #: faces beside red clothes have 0.08 to 0.12. A picked colour with less chroma than GREY has none.
 HUE, GREY = 0.08, 0.1
-#: A pick may take more than one thing if more than MOST of its pixels are farther than FAR from the
-#: picked colour in pick space; SOME are enough if it takes more than LARGE of the frame, or covers
-#: three of its borders, as skies and walls do.
-FAR, MOST, SOME, LARGE = 0.2, 0.6, 0.1, 0.25
 
 
 @dataclass(frozen=True)
@@ -87,24 +80,12 @@ class Note:
     id: str = ""
     warns: bool = False
 
-    def proposing(self, gesture: Literal["hold", "area"], taken: B) -> Note:
-        """Return the note with a gesture, after which the pick takes some pixels."""
-        return replace(self, gesture=gesture, effect=f"then takes {percent(taken.mean())}")
-
-    def lines(self) -> list[str]:
-        """Return the note for people, and the gesture as arguments of `edit`."""
-        text, place = "warning: " * self.warns + self.words, self.place
-        if place is None:
-            return [text]
-        pixel = f"{place.pixel[0]},{place.pixel[1]}"
-        lines = [f"{text}: {hex_of(place.rgb)} at {pixel}"]
-        if self.gesture:
-            what = f"if it belongs to the thing: area {self.id}"
-            if self.gesture == "hold":
-                what = "to keep it: hold"
-            where = f"--frame {place.frame} --pixel {pixel} --box {place.box}"
-            lines.append(f"  {what} {where} ({self.effect})")
-        return lines
+    def proposing(self, gesture: Literal["hold", "area"], after: F32, cost: float = 0) -> Note:
+        """Return the note with a gesture: what it leaves of the change, and costs the thing."""
+        effect = f"then takes {percent(float(after.mean()))}"
+        if cost > COST:
+            effect += f", and {percent(cost)} less of the thing"
+        return replace(self, gesture=gesture, effect=effect)
 
 
 @dataclass(frozen=True)
@@ -115,8 +96,8 @@ class Answer:
     ----------
     frame : int
     share : float
-        Share of the frame's pixels that are taken: they get at least a quarter of the change. Of a
-        hold: that it keeps.
+        Share of the frame that is taken, or kept by a hold: the mean of its matte, so that a pixel
+        with half of the change counts as half.
     notes : tuple of Note
         What else the user should know.
     kind : 'pick' or 'hold'
@@ -127,12 +108,6 @@ class Answer:
     notes: tuple[Note, ...] = ()
     kind: Literal["pick", "hold"] = "pick"
 
-    def lines(self) -> list[str]:
-        """Return the answer for people."""
-        verb = "takes" if self.kind == "pick" else "keeps"
-        first = f"{verb} {percent(self.share)} of frame {self.frame}"
-        return [first, *(line for note in self.notes for line in note.lines())]
-
 
 def answer_to(grade: Grade, pick: Pick, clip: ClipOfPicks) -> Answer | None:
     """Return the answer to a pick or hold; None where the clip is not there."""
@@ -142,25 +117,26 @@ def answer_to(grade: Grade, pick: Pick, clip: ClipOfPicks) -> Answer | None:
     pick = replace(pick, start=None, until=None)
     grade = grade.put("pick", pick.id, pick)
     view = _View.of(grade, clip, pick.frame)
-    others = [other for other in grade.picks if other.enabled and other.id != pick.id]
-    picks = [other for other in others if other.kind == "pick"]
+    picks = [other for other in grade.picks if other.enabled and other.kind == "pick"]
+    holds = [other for other in grade.picks if other.enabled and other.kind == "hold"]
     notes: list[Note] = []
     if pick.kind == "hold":
         without = pick_edits.unpick(grade, clip, pick.id)
         for other in picks:
-            if (cost := _cost(view, other, pick, without)) is not None:
+            it = _Thing.of(_View.of(grade, clip, other.frame), other, holds)
+            if (cost := _cost(view, it, pick, without)) is not None:
                 notes += [_less(view, other, without), *cost]
         if picks and not notes:
             notes = [Note("no pick takes less by it: hold a place that one takes", warns=True)]
     else:
-        holds = [other for other in others if other.kind == "hold"]
-        notes += _unmarked(view, pick, holds)
+        it = _Thing.of(view, pick, holds)
+        notes += _unmarked(it)
         for hold in holds:
-            notes += _cost(view, pick, hold, pick_edits.unpick(grade, clip, hold.id)) or ()
-        notes += _shared(view, pick, picks)
-        notes += _also(view, pick)
+            notes += _cost(view, it, hold, pick_edits.unpick(grade, clip, hold.id)) or ()
+        notes += _shared(view, pick, [other for other in picks if other.id != pick.id])
+        notes += _also(it)
     kind: Literal["pick", "hold"] = "hold" if pick.kind == "hold" else "pick"
-    return Answer(view.frame, float(view.taken(pick).mean()), tuple(notes), kind)
+    return Answer(view.frame, float(view.change(pick).mean()), tuple(notes), kind)
 
 
 @dataclass(frozen=True)
@@ -186,40 +162,41 @@ class _View:
         shown = np.where(real[..., None], rgb, 0).astype(np.float32)
         return cls(grade, clip, nearest, every, shown, real)
 
+    def under(self, grade: Grade) -> _View:
+        """Return the same frame with another grade."""
+        return replace(self, grade=grade)
+
     def change(self, pick: Pick) -> F32:
-        """Return the share of a pick's change that each pixel gets, with this view's grade."""
+        """Return the share of a pick's change that each pixel gets, 0..1."""
         # Any palette will do: none of its colours moves.
         corner, faces = np.zeros((1, 3)), np.zeros((0, 3), np.int32)
         matte = self.grade.core.pick_matte_at(pick.id, self.frame)
         drawing = _core.Recolourer(corner, corner, faces, picks=matte)
         drawn = drawing.apply(self.rgb, precision="single")
-        return np.where(self.real, (drawn - self.rgb)[..., 0], 0).astype(np.float32)
+        share = np.where(self.real, (drawn - self.rgb)[..., 0], 0)
+        return np.clip(share, 0, 1).astype(np.float32)
 
-    def taken(self, pick: Pick, grade: Grade | None = None) -> B:
-        """Return the pixels that a pick takes, with this view's grade or another one."""
-        view = self if grade is None else replace(self, grade=grade)
-        return np.asarray(view.change(pick) > TAKEN)
+    def taken(self, pick: Pick) -> B:
+        """Return the pixels that a pick takes."""
+        return np.asarray(self.change(pick) > TAKEN)
 
-    def away(self, pick: Pick) -> tuple[F64, F64]:
-        """Return each pixel's distance in pick space from the nearest marked colour, and hue."""
-        display = self.grade.display()
-        points = _core.pick_points(self.rgb.reshape(-1, 3), display).reshape(self.rgb.shape)
-        marked = [self.rgb[self.mark(area) & self.real] for area in pick.areas if self.has(area)]
+    def points(self, rgb: NDArray[np.floating]) -> F64:
+        """Return colours, (..., 3), as points of pick space."""
+        points = _core.pick_points(rgb.reshape(-1, 3), self.grade.display())
+        return np.asarray(points).reshape(rgb.shape)
+
+    def hue(self, pick: Pick) -> F64:
+        """Return each pixel's distance in pick space from the nearest marked hue."""
+        points, hues = self.points(self.rgb), []
+        marked = [self.rgb[mark & self.real] for mark in self.marks(pick.areas)]
         colours = [pick.rgb, *(np.median(rgb, axis=0) for rgb in marked if len(rgb))]
-        distances, hues = [], []
-        for own in _core.pick_points(np.asarray(colours), display):
-            off = points - own
-            chroma = float(np.hypot(own[0], own[1]))
-            distances.append(np.linalg.norm(off, axis=2))
+        for u, v, _ in self.points(np.asarray(colours)):
+            chroma = float(np.hypot(u, v))
             if chroma < GREY:
-                hues.append(np.hypot(off[..., 0], off[..., 1]))
+                hues.append(np.hypot(points[..., 0] - u, points[..., 1] - v))
             else:
-                hues.append(np.abs(off[..., 0] * own[1] - off[..., 1] * own[0]) / chroma)
-        return np.min(distances, axis=0), np.min(hues, axis=0)
-
-    def has(self, area: Area) -> bool:
-        """Return whether an area was marked in this frame."""
-        return round(area.frame) == self.frame
+                hues.append(np.abs(points[..., 0] * v - points[..., 1] * u) / chroma)
+        return np.asarray(np.min(hues, axis=0))
 
     def mark(self, area: Area) -> B:
         """Return the pixels of a box or stroke."""
@@ -233,21 +210,14 @@ class _View:
             marked[rows, columns] = True
         return marked
 
-    def seeds(self, pick: Pick) -> B:
-        """Return the pixels that the user marked in this frame."""
-        marks = [self.mark(area) for area in pick.marks if self.has(area)]
-        return np.asarray(np.any([np.zeros(self.real.shape, bool), *marks], axis=0))
+    def marks(self, areas: Sequence[Area]) -> list[B]:
+        """Return the pixels of each area that was marked in this frame."""
+        marks = [self.mark(area) for area in areas if round(area.frame) == self.frame]
+        return [mark for mark in marks if mark.any()]
 
-    def thing(self, pick: Pick, taken: B) -> B:
-        """Return what is connected with what the user marked here; all, if nothing was."""
-        from scipy import ndimage
-
-        seeds = self.seeds(pick)
-        if not seeds.any():
-            return taken
-        labels, _ = ndimage.label(ndimage.binary_dilation(taken))  # across gaps of a pixel or two
-        kept = np.unique(labels[seeds])
-        return np.asarray(np.isin(labels, kept[kept > 0]) & taken)
+    def any_of(self, masks: Sequence[B]) -> B:
+        """Return where one of some masks is."""
+        return np.asarray(np.any([np.zeros(self.real.shape, bool), *masks], axis=0))
 
     def place(self, mask: B) -> Place:
         """Return the middle of a mask's largest part, and a box that lies in it."""
@@ -256,22 +226,8 @@ class _View:
         rgb = as_colour(np.median(self.rgb[largest], axis=0).tolist())
         return Place(self.frame, pixel, box * self.every, rgb)
 
-    def beside(self, pick: Pick, thing: B, taken: B) -> B:
-        """Return the largest part of the pick's hue that is connected with it and not taken."""
-        from scipy import ndimage
-
-        whole_hue = self.grade.put("pick", pick.id, replace(pick, matte=None))
-        labels, count = ndimage.label(_opened(self.taken(pick, whole_hue) & ~taken))
-        sizes = np.bincount(labels.ravel(), minlength=1)
-        touching = np.zeros(count + 1, bool)
-        touching[labels[_widened(thing)]] = True
-        touching[0] = False
-        if not touching.any():
-            return np.zeros_like(thing)
-        return np.asarray(labels == np.where(touching, sizes, 0).argmax())
-
-    def after(self, pick: Pick, gesture: Literal["hold", "area"], place: Place) -> B | None:
-        """Return what a pick takes after a gesture at a place; None if the gesture is refused."""
+    def after(self, pick: Pick, gesture: Literal["hold", "area"], place: Place) -> F32 | None:
+        """Return a pick's change after a gesture at a place; None if the gesture is refused."""
         try:
             if gesture == "hold":
                 where = When(pixel=place.pixel, box=place.box, follow=False)
@@ -281,19 +237,66 @@ class _View:
                 trial = pick_edits.add_area(self.grade, self.clip, pick.id, area)
         except Palette4dError:
             return None
-        return self.taken(trial.pick(pick.id), trial)
-
-    def with_area(self, note: Note, place: Place, pick: Pick, part: B) -> Note:
-        """Return a note with an area of a pick at its place, if that adds a part and no more."""
-        most = self.taken(pick).sum() + MULTIPLIES * part.sum()
-        taken = self.after(pick, "area", place)
-        if taken is None or taken[part].mean() < 0.5 or taken.sum() > most:
-            return note
-        return note.proposing("area", taken)
+        return self.under(trial).change(pick)
 
 
-def _unmarked(view: _View, pick: Pick, holds: Sequence[Pick]) -> Iterator[Note]:
-    """Report areas that the user marked as the pick's and that it does not take."""
+@dataclass(frozen=True)
+class _Thing:
+    """A pick's thing in the frame that it was picked in, as it is without holds.
+
+    `own` is the thing, `beside` what is connected with it and is another thing, `joined` the part
+    of that where it was noticed; `away` says how unlike the marks each pixel is. `free` is the
+    grade without holds.
+    """
+
+    view: _View
+    free: Grade
+    pick: Pick
+    marks: list[B]
+    own: B
+    beside: B
+    joined: B
+    away: F64 | None
+
+    @classmethod
+    def of(cls, view: _View, pick: Pick, holds: Sequence[Pick]) -> _Thing:
+        grade = pick_edits.unpick(view.grade, view.clip, *(hold.id for hold in holds))
+        free, marks, none = view.under(grade), view.marks(pick.marks), np.zeros_like(view.real)
+        before = free.change(pick)
+        taken = before > TAKEN
+        if not marks:
+            return cls(view, grade, pick, marks, taken, none, none, None)
+        marked, away = view.any_of(marks), thing.unlike(view.points(view.rgb), marks)
+        whole = thing.connected(_widened(taken), marked) & taken
+        for own, part in thing.joins(taken, marked, away, SAME_COLOUR, int(OTHERS * taken.size)):
+            after = free.after(pick, "hold", view.place(part))
+            if after is not None and _parted(before, after, part, marks):
+                return cls(view, grade, pick, marks, own, whole & ~own, part, away)
+        return cls(view, grade, pick, marks, whole, none, none, away)
+
+    def side(self, others: B) -> B:
+        """Return the part of the thing that is not nearer to other pixels."""
+        if self.away is None or not others.any():
+            return self.own
+        return self.own & thing.nearer(self.away, self.view.any_of(self.marks), others)
+
+
+def _parted(before: F32, after: F32, part: B, marks: Sequence[B]) -> bool:
+    """Return whether a hold takes most of a part's change, and hardly any of what was marked."""
+    return _lost(before, after, part) > 0.5 and all(
+        _lost(before, after, mark) <= COST for mark in marks
+    )
+
+
+def _lost(before: F32, after: F32, part: B) -> float:
+    """Return the share of a part's change that is lost."""
+    lost = np.maximum(before - after, 0)[part].sum()
+    return float(lost / max(float(before[part].sum()), 1e-9))
+
+
+def _unmarked(it: _Thing) -> Iterator[Note]:
+    """Report areas that the user marked as the pick's, and that it does not take without holds."""
+    pick = it.pick
     for area in pick.marks:
         if (strength := pick.strength_at(area.frame, 1.0)) < 0.5:
             if area.frame != pick.frame:
@@ -303,54 +306,55 @@ def _unmarked(view: _View, pick: Pick, holds: Sequence[Pick]) -> Iterator[Note]:
                     warns=True,
                 )
             continue
-        there = _View.of(view.grade, view.clip, area.frame)
+        there = _View.of(it.free, it.view.clip, area.frame)
         marked = there.mark(area) & there.real
         left = marked & (there.change(pick) < LEAST)
-        if left.sum() <= 0.5 * marked.sum():
-            continue
-        keepers = [hold.id for hold in holds if there.taken(hold)[left].mean() > 0.5]
-        why = "it looks like what is around it; pick it too, as a colour of its own"
-        if keepers:
-            why = f"{' and '.join(keepers)} keeps it; remove that hold, or hold another place"
-        yield Note(f"does not take what you marked ({why})", there.place(left), warns=True)
+        if left.sum() > 0.5 * marked.sum():
+            yield Note(
+                "does not take what you marked (it looks like what is around it; pick it too, as a "
+                "colour of its own)",
+                there.place(left),
+                warns=True,
+            )
 
 
 def _less(view: _View, pick: Pick, without: Grade) -> Note:
     """Report what a pick takes with a hold and without it."""
-    now, before = (float(view.taken(pick, grade).mean()) for grade in (view.grade, without))
+    now, before = (float(v.change(pick).mean()) for v in (view, view.under(without)))
     return Note(
         f"{pick.id} takes {percent(now)} of frame {view.frame}, {percent(before)} without it"
     )
 
 
-def _cost(view: _View, pick: Pick, hold: Pick, without: Grade) -> list[Note] | None:
+def _cost(view: _View, it: _Thing, hold: Pick, without: Grade) -> list[Note] | None:
     """Report what a hold costs a pick's thing; None if the pick takes no less by it.
 
     `without` is the grade without the hold.
     """
-    there = _View.of(view.grade, view.clip, pick.frame)
-    lost, elsewhere = (
-        replace(each, grade=without).change(without.pick(pick.id)) - each.change(pick) > TAKEN
-        for each in (there, view)
-    )
-    if not lost.any() and not elsewhere.any():
+    pick, there = it.pick, it.view
+    if all((v.under(without).change(pick) - v.change(pick)).max() <= TAKEN for v in (view, there)):
         return None
-    thing, seeds = there.thing(pick, there.taken(without.pick(pick.id), without)), there.seeds(pick)
-    words = f"{hold.id} lies on what you picked for {pick.id}, and costs it {{}}"
-    if not seeds.any() or lost[seeds].mean() <= 0.5:
-        words = f"{hold.id} also costs {pick.id} {{}} of its own thing"
-        held = _widened(there.thing(hold, there.taken(hold)))
-        thing = thing & ((there.away(pick)[0] < there.away(hold)[0]) | ~held)
-        lost = _opened(lost & thing)
-        if lost.sum() <= COST * thing.sum():
-            return []
-    words = words.format(percent(float(lost.sum() / max(thing.sum(), 1))))
-    place = there.place(lost)
-    note = Note(f"{words}, most of it", place, id=pick.id, warns=True)
-    tried = there.with_area(note, place, pick, lost)
-    if not tried.gesture:
-        tried = replace(note, words=f"{words} (remove it, or hold another place), most of it")
-    return [tried]
+    words = f"{hold.id} lies on what you marked for {pick.id}, and costs it {{}}"
+    areas = [(area, _View.of(view.grade, view.clip, area.frame)) for area in pick.marks]
+    parts = [(words, seen, seen.mark(area)) for area, seen in areas]
+    held = there.any_of(there.marks(hold.marks))
+    parts.append((f"{hold.id} also costs {pick.id} {{}} of its thing", there, it.side(held)))
+    for words, there, part in parts:
+        before, now = there.under(without).change(pick), there.change(pick)
+        if (share := _lost(before, now, part)) <= COST:
+            continue
+        lost = np.where(part, np.maximum(before - now, 0), 0)
+        place = there.place(lost >= min(TAKEN, float(lost.max())))
+        words = words.format(percent(share))
+        after = there.after(pick, "area", place)
+        if after is not None:
+            gained = np.maximum(after - now, 0)
+            if np.minimum(gained, lost).sum() >= max(gained.sum(), lost.sum()) / 2:
+                note = Note(f"{words}, most of it", place, id=pick.id, warns=True)
+                return [note.proposing("area", after)]
+        words += " (remove it, or hold another place), most of it"
+        return [Note(words, place, id=pick.id, warns=True)]
+    return []
 
 
 def _shared(view: _View, pick: Pick, picks: Sequence[Pick]) -> Iterator[Note]:
@@ -374,40 +378,37 @@ def _shared(view: _View, pick: Pick, picks: Sequence[Pick]) -> Iterator[Note]:
         )
 
 
-def _also(view: _View, pick: Pick) -> Iterator[Note]:
-    """Report what the pick takes beside the thing, a part that it may lack, and floods."""
-    taken = view.taken(pick)
-    thing = view.thing(pick, taken)
-    away, hue = view.away(pick)
-    odd = _opened(taken & (hue > HUE))
-    for words, others in (
+def _also(it: _Thing) -> Iterator[Note]:
+    """Report what the pick takes beside the thing, the largest first."""
+    pick, view = it.pick, it.view
+    change = view.change(pick)
+    taken = change > TAKEN
+    odd = _opened(taken & (view.hue(pick) > HUE))
+    beside, elsewhere = (taken & where & ~odd for where in (it.beside, ~(it.own | it.beside)))
+    flood = change[beside].sum() > change[it.own & ~odd].sum()
+    kinds = [
         ("also takes another hue", odd),
-        ("also takes its colour elsewhere", taken & ~thing & ~odd),
-    ):
-        share, spared = float(others.mean()), thing & ~others
-        if share > OTHERS:
-            place = view.place(others)
-            note = Note(f"{words}, {percent(share)}, most of it", place, id=pick.id)
-            held = view.after(pick, "hold", place)
-            if held is not None and held[others].mean() <= 0.5:
-                cost = (~held & spared).sum()
-                note = note.proposing("hold", held) if cost <= COST / 2 * spared.sum() else note
+        (
+            "takes more beside the thing than of it" if flood else "also takes what touches it",
+            beside,
+        ),
+        ("also takes its colour elsewhere", elsewhere),
+    ]
+    for words, others in sorted(kinds, key=lambda kind: -change[kind[1]].sum()):
+        if (share := float(change[others].sum() / change.size)) <= OTHERS:
+            return
+        touches = others is beside
+        spot = others & it.joined if touches and (others & it.joined).any() else others
+        spot = largest_part(spot)[0]
+        place = view.place(spot)
+        note = Note(f"{words}, {percent(share)}", place, id=pick.id, warns=bool(touches and flood))
+        after = view.after(pick, "hold", place)
+        if after is not None and _parted(change, after, spot, it.marks):
+            cost = _lost(change, after, it.side(spot) & ~others)
+            if cost <= COST or touches:
+                note = note.proposing("hold", after, cost)
+        if note.gesture or others is not odd:
             yield note
-    part = view.beside(pick, thing, taken)
-    least = max(PART, 0.1 * taken.mean())
-    if least < part.mean() < thing.mean() and not pick.whole_hue:  # a larger one is another thing
-        words, place = f"does not take {percent(float(part.mean()))} beside it", view.place(part)
-        note = view.with_area(Note(words, place, id=pick.id), place, pick, part)
-        if note.gesture:
-            yield note
-    sides = (thing[0], thing[-1], thing[:, 0], thing[:, -1])
-    large = taken.mean() > LARGE or sum(bool(side.mean() >= 1 / 3) for side in sides) >= 3
-    if thing.any() and (away[thing] > FAR).mean() > (SOME if large else MOST):
-        less = ", or a lower reach, takes less" if pick.reach >= 0 else " takes less"
-        yield Note(
-            f"this may be more than one thing: look at its matte. A hold on what must stay{less}",
-            warns=True,
-        )
 
 
 def _opened(mask: B) -> B:

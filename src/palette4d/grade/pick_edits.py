@@ -128,6 +128,11 @@ def correct_path(
 def add_area(grade: Grade, clip: ClipOfPicks, id: str, area: Area) -> Grade:
     """Say that a box or a stroke belongs to a pick or hold too (`Document.add_area`)."""
     old = grade.pick(id)
+    if old.whole_hue:
+        raise Palette4dError(
+            f"{id} takes all of its hue, and learns nothing from areas: end that first, with "
+            f"{Arg('whole_hue', False)}, or pick there too"
+        )
     grade.check_frame(area.frame)
     if clip.missing:
         raise Palette4dError(
@@ -135,12 +140,9 @@ def add_area(grade: Grade, clip: ClipOfPicks, id: str, area: Area) -> Grade:
             f"learned from its pixels; give {Arg('clip')}"
         )
     clip.check_places(area.frame, area.points)
-    changed = replace(old, areas=(*old.areas, area), whole_hue=False)
     what = "a box" if len(area.points) == 1 else "a stroke"
     label = f"add {what} at frame {area.frame:g} to {id}"
-    if old.whole_hue:
-        label += ", which takes learned colours now, not all of its hue"
-    return _learned(grade, clip, changed, label)
+    return _learned(grade, clip, replace(old, areas=(*old.areas, area)), label)
 
 
 def change_pick(

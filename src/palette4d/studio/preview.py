@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.common.errors import in_words
-from palette4d.grade.answer import TAKEN, WIDTH
+from palette4d.grade.answer import WIDTH
 from palette4d.grade.document import Document
 from palette4d.grade.mattes import Display as Curve
 from palette4d.grade.palette import Palette
@@ -473,14 +473,14 @@ def matte_of(
 
 
 def taken_share(pixels: F32, document: Document, id_: str, frame: int) -> float:
-    """Return the share of a frame that a pick or hold takes there: a quarter of its change or more.
+    """Return the share of a frame that a pick or hold takes there: the mean of its matte.
 
     Large pictures are looked at in every n-th pixel.
     """
     step = max(1, round(pixels.shape[1] / WIDTH))
     picks = document.grade.core.pick_matte_at(id_, frame)
     matte = matte_of(pixels[::step, ::step], Grade.of(document, frame), id_, picks)
-    return 0.0 if matte is None else float((matte > TAKEN).mean())
+    return 0.0 if matte is None else float(matte.mean())
 
 
 def _highlighted(picture: U8, matte: F32) -> U8:
