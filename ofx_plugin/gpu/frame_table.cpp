@@ -193,7 +193,8 @@ void add_picks(const Recolourer& map, FrameTable& result) {
 }
 
 void add_cells(const CleanUp::Place& place, double amount, FrameTable& result) {
-    static_assert(P4D_NOISE == static_cast<float>(kCleanUpNoise) && kCleanUpReach == 2);
+    static_assert(P4D_NOISE == static_cast<float>(kCleanUpNoise) && kCleanUpReach == 2 &&
+                  P4D_FAINT == kCleanUpFaint && P4D_MOST == kCleanUpMost);
     const CleanUpCells cells = clean_up_cells(place);
     result.columns = cells.column2 - cells.column1;
     result.rows = cells.row2 - cells.row1;

@@ -8,7 +8,7 @@ from palette4d import _core
 
 F64 = NDArray[np.float64]
 
-CELL, AROUND, NOISE = 4, 2, 4e-4
+CELL, AROUND, NOISE, FAINT, MOST = 4, 2, 4e-4, 0.1, 2.0
 TETRAHEDRON = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
 FACES = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
 
@@ -77,31 +77,48 @@ def limited(colours: F64) -> F64:
         return np.where(colours > 1, 2 - 1 / colours, low)
 
 
-def filtered(guide: F64, displacement: F64, good: NDArray[np.bool_], cell: int = CELL) -> F64:
+def shares_of(image: NDArray[np.float32], found: _core.FramePicks) -> F64:
+    """Return the shares of their changes that picks do, (h, w, 1): changes by 1 everywhere."""
+    whole = [(colour, (1.0, 1.0, 1.0), 1.0, matte) for colour, _, _, matte in found.picks]
+    map_ = _core.Recolourer(TETRAHEDRON, TETRAHEDRON, FACES, picks=_core.FramePicks(whole))
+    result: F64 = (map_.apply(image).astype(np.float64) - image)[..., :1]
+    return result
+
+
+def filtered(
+    image: NDArray[np.float32],
+    displacement: F64,
+    good: NDArray[np.bool_],
+    found: _core.FramePicks | None = None,
+    cell: int = CELL,
+) -> F64:
     """Return the displacement, filtered with the picture as its guide, (h, w, 3)."""
     height, width = good.shape
-    guide = limited(np.where(good[..., None], guide, 0))
-    displacement = np.where(good[..., None], displacement, 0)
+    image = np.where(good[..., None], image, 0).astype(np.float32)
+    guide = limited(image.astype(np.float64))
+    moved = np.concatenate([displacement, shares_of(image, found or picks())], -1)
+    moved = np.where(good[..., None], moved, 0)
     products = (guide[..., :, None] * guide[..., None, :]).reshape(height, width, 9)
-    mixed = (guide[..., :, None] * displacement[..., None, :]).reshape(height, width, 9)
-    cells = cells_of(
-        np.concatenate([good[..., None], guide, displacement, products, mixed], -1), cell
-    )
+    mixed = (guide[..., :, None] * moved[..., None, :]).reshape(height, width, 12)
+    cells = cells_of(np.concatenate([good[..., None], guide, moved, products, mixed], -1), cell)
     sums = around(cells)
     means = sums[..., 1:] / np.maximum(sums[..., :1], 1)
     shape = (*means.shape[:2], 3, 3)
-    mean_guide, mean_moved = means[..., :3], means[..., 3:6]
+    mean_guide, mean_moved = means[..., :3], means[..., 3:7]
     column = mean_guide[..., :, None]
-    covariance = means[..., 6:15].reshape(shape) - column * mean_guide[..., None, :]
-    mixed = means[..., 15:].reshape(shape) - column * mean_moved[..., None, :]
+    covariance = means[..., 7:16].reshape(shape) - column * mean_guide[..., None, :]
+    mixed = means[..., 16:].reshape(*shape[:3], 4) - column * mean_moved[..., None, :]
     slopes = np.linalg.solve(covariance + NOISE * np.eye(3), mixed)
     constant = mean_moved - np.einsum("...c,...cd->...d", mean_guide, slopes)
-    terms = np.concatenate([slopes.reshape(*shape[:2], 9), constant], -1)
+    terms = np.concatenate([slopes.reshape(*shape[:2], 12), constant], -1)
     weight = (cells[..., :1] > 0).astype(np.float64)
     terms = around(terms * weight) / np.maximum(around(weight), 1)
     terms = between(terms, height, width, cell)
-    slopes, constant = terms[..., :9].reshape(height, width, 3, 3), terms[..., 9:]
-    return np.einsum("hwc,hwcd->hwd", guide, slopes) + constant
+    slopes, constant = terms[..., :12].reshape(height, width, 3, 4), terms[..., 12:]
+    found_moved = np.einsum("hwc,hwcd->hwd", guide, slopes) + constant
+    share = np.maximum(found_moved[..., 3:], 0)
+    result: F64 = found_moved[..., :3] * np.minimum(share, MOST) / np.maximum(share, FAINT)
+    return result
 
 
 @pytest.mark.parametrize("size", [(64, 96), (37, 51), (3, 5), (1, 1), (9, 130)])
@@ -111,9 +128,8 @@ def test_the_core_filters_what_picks_do(size: tuple[int, int], amount: float, mo
     image = picture(*size)
     edit = recolourer(moves=moves)
     palette = recolourer(_core.FramePicks([]), moves=moves)
-    guide = image.astype(np.float64)
     displacement = edit.apply(image).astype(np.float64) - palette.apply(image)
-    change = filtered(guide, displacement, np.ones(size, bool)) - displacement
+    change = filtered(image, displacement, np.ones(size, bool)) - displacement
     expected = _core.draw(image, "recoloured", edit, clean_up=0) + amount * change
     drawn = _core.draw(image, "recoloured", edit, clean_up=amount)
     np.testing.assert_allclose(drawn, expected, atol=3e-6)
@@ -125,9 +141,20 @@ def test_highlights_and_negative_colours_guide_as_nearer_ones() -> None:
     image[40:44, 30:50] -= 3
     guide = image.astype(np.float64)
     displacement = _core.draw(image, "recoloured", recolourer(), clean_up=0) - guide
-    expected = guide + filtered(guide, displacement, np.ones((60, 80), bool))
+    expected = guide + filtered(image, displacement, np.ones((60, 80), bool))
     drawn = _core.draw(image, "recoloured", recolourer())
     np.testing.assert_allclose(drawn, expected, atol=3e-6, rtol=3e-7)
+
+
+def test_a_white_beside_a_strong_change_does_not_go_the_other_way() -> None:
+    # Eyes in a pale face beside red lockers that become blue.
+    image = np.full((40, 60, 3), (0.75, 0.25, 0.2), np.float32)
+    image[12:30, 20:34] = 0.55, 0.5, 0.3
+    image[18:20, 24:26] = 0.95, 0.95, 0.95
+    for found in (picks(), picks((0.2, 0.1, -0.2))):
+        drawn = _core.draw(image, "recoloured", recolourer(found))
+        np.testing.assert_allclose(drawn[18:20, 24:26], image[18:20, 24:26], atol=0.002)
+        assert np.abs(drawn[2, 2] - image[2, 2]).max() > 0.15
 
 
 def test_colours_that_are_none_take_no_part() -> None:
@@ -137,7 +164,7 @@ def test_colours_that_are_none_take_no_part() -> None:
     good = np.isfinite(image).all(-1)
     guide = np.where(good[..., None], image, 0).astype(np.float64)
     displacement = recolourer().apply(guide.astype(np.float32)).astype(np.float64) - guide
-    expected = guide + filtered(guide, displacement, good)
+    expected = guide + filtered(image, displacement, good)
     drawn = _core.draw(image, "recoloured", recolourer())
     np.testing.assert_array_equal(drawn[~good], image[~good])
     np.testing.assert_allclose(drawn[good], expected[good], atol=3e-6)

@@ -89,7 +89,7 @@ int clean_up_support(int cell) { return (2 * kAround + 2) * cell; }
 struct CleanUp::Block {
     alignas(64) float colour[4][kInBlock];  ///< and alpha, where it divides
     alignas(64) float guide[3][kInBlock];
-    alignas(64) float moved[4][kInBlock];  ///< what picks do, and what holds leave
+    alignas(64) float moved[kCleanUpMoved][kInBlock];  ///< what picks do, and their share
     alignas(
         64) float counts[kInBlock];  ///< 1 where there is a pixel that can be recoloured, else 0
     bool some;                       ///< picks move some of them
@@ -136,7 +136,7 @@ bool CleanUp::load(const float* row, int row_x, int row_end, int x, Block& block
     kernels_.limit(block.colour, block.guide);
     block.some = set_picks_(picks_, block.colour, block.moved, kInBlock);
     if (!block.some) {
-        for (int c = 0; c < 3; ++c) std::fill_n(block.moved[c], kInBlock, 0.0f);
+        for (int c = 0; c < kCleanUpMoved; ++c) std::fill_n(block.moved[c], kInBlock, 0.0f);
         return false;
     }
     block.some = kernels_.keep(block.counts, block.moved);

@@ -3,9 +3,10 @@
 //
 // Cells of pixels, counted from the picture's lower left corner, are averaged. In 5 x 5 cells the
 // displacement is fitted by a linear function of the colour. The functions of 5 x 5 cells are
-// averaged, interpolated between the cells' centres, and applied to the pixels' colours. Colours
-// beyond 0..1 guide as nearer ones, within -1..2. All sums have a fixed order: tiles, threads and
-// render windows do not change the result.
+// averaged, interpolated between the cells' centres, and applied to the pixels' colours. So is the
+// share, a matte times an amount of a colour: where it comes out as less than none, nothing moves.
+// Colours beyond 0..1 guide as nearer ones, within -1..2. All sums have a fixed order: tiles,
+// threads and render windows do not change the result.
 #pragma once
 
 #include <functional>

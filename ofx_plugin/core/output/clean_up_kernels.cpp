@@ -7,7 +7,10 @@
 namespace {
 
 using palette4d::CleanUpKernels;
+using palette4d::kCleanUpFaint;
 using palette4d::kCleanUpGuideSums;
+using palette4d::kCleanUpMost;
+using palette4d::kCleanUpMoved;
 using palette4d::kCleanUpNoise;
 using palette4d::kCleanUpReach;
 using palette4d::kCleanUpRows;
@@ -51,12 +54,13 @@ void limit(CleanUpKernels::ConstChannels colour, CleanUpKernels::Channels guide)
 
 bool keep(const float* __restrict counts, CleanUpKernels::Channels moved) {
     int some = 0;
-    for (int channel = 0; channel < 3; ++channel) {
+    for (int channel = 0; channel < kCleanUpMoved; ++channel) {
         float* __restrict const to = moved[channel];
+        const int counted = channel < 3 ? 1 : 0;
         for (int i = 0; i < kSize; ++i) {
             const float kept = counts[i] != 0 ? to[i] : 0.0f;
             to[i] = kept;
-            some |= kept != 0 ? 1 : 0;
+            some |= kept != 0 ? counted : 0;
         }
     }
     return some != 0;
@@ -90,11 +94,11 @@ inline __attribute__((always_inline)) void add_some(CleanUpKernels::ConstChannel
         for (int p = 0; p < kCleanUpGuideSums; ++p) to[p][c] = sum[p];
     }
     if (!moved) return;
-    for (int d = 0; d < 3; ++d) {
+    for (int d = 0; d < kCleanUpMoved; ++d) {
         double* __restrict const first = sums + (kCleanUpGuideSums + d) * plane;
-        double* __restrict const with_red = first + 3 * plane;
-        double* __restrict const with_green = first + 6 * plane;
-        double* __restrict const with_blue = first + 9 * plane;
+        double* __restrict const with_red = first + kCleanUpMoved * plane;
+        double* __restrict const with_green = with_red + kCleanUpMoved * plane;
+        double* __restrict const with_blue = with_green + kCleanUpMoved * plane;
         for (int c = 0; c < columns; ++c) {
             double sum = first[c], red = with_red[c], green = with_green[c], blue = with_blue[c];
             for (int k = 0; k < Width; ++k) {
@@ -166,18 +170,18 @@ void fit_some(const double* const* rows, std::ptrdiff_t plane, int from, int cou
         const double below = gb - l10 * rb, l21 = below * d1;
         const double p2 = bb - l20 * rb - l21 * below;
         const double d2 = 1 / (p2 > kCleanUpNoise ? p2 : kCleanUpNoise);
-        for (int d = 0; d < 3; ++d) {
+        for (int d = 0; d < kCleanUpMoved; ++d) {
             const double mean = share * sums[10 + d][i];
-            const double y0 = share * sums[13 + d][i] - r * mean;
-            const double y1 = share * sums[16 + d][i] - g * mean - l10 * y0;
-            const double y2 = share * sums[19 + d][i] - b * mean - l20 * y0 - l21 * y1;
+            const double y0 = share * sums[14 + d][i] - r * mean;
+            const double y1 = share * sums[18 + d][i] - g * mean - l10 * y0;
+            const double y2 = share * sums[22 + d][i] - b * mean - l20 * y0 - l21 * y1;
             const double x2 = y2 * d2;
             const double x1 = y1 * d1 - l21 * x2;
             const double x0 = y0 * d0 - l10 * x1 - l20 * x2;
             found[d][i] = x0;
-            found[3 + d][i] = x1;
-            found[6 + d][i] = x2;
-            found[9 + d][i] = mean - x0 * r - x1 * g - x2 * b;
+            found[4 + d][i] = x1;
+            found[8 + d][i] = x2;
+            found[12 + d][i] = mean - x0 * r - x1 * g - x2 * b;
         }
     }
     for (int p = 0; p < kCleanUpTerms; ++p) {
@@ -228,16 +232,28 @@ void apply(const CleanUpKernels::Nodes& nodes, CleanUpKernels::ConstChannels gui
         const int slot = k * cells;
         const float *const r = guide[0] + slot, *const g = guide[1] + slot,
                            *const b = guide[2] + slot, *const n = counts + slot;
-        for (int d = 0; d < 3; ++d) {
+        float scale[kSize];
+        for (int d = kCleanUpMoved - 1; d >= 0; --d) {
+            float found[kSize];
+            for (int c = 0; c < cells; ++c) {
+                const float x0 = terms[d][c] + part * steps[d][c];
+                const float x1 = terms[4 + d][c] + part * steps[4 + d][c];
+                const float x2 = terms[8 + d][c] + part * steps[8 + d][c];
+                const float rest = terms[12 + d][c] + part * steps[12 + d][c];
+                found[c] = x0 * r[c] + x1 * g[c] + x2 * b[c] + rest;
+            }
+            if (d == 3) {
+                for (int c = 0; c < cells; ++c) {
+                    const float share = found[c] > 0 ? found[c] : 0.0f;
+                    const float within = share < kCleanUpMost ? share : kCleanUpMost;
+                    scale[c] = filtered * within / (share > kCleanUpFaint ? share : kCleanUpFaint);
+                }
+                continue;
+            }
             const float* const by = moved[d] + slot;
             float* __restrict const to = change[d] + slot;
             for (int c = 0; c < cells; ++c) {
-                const float x0 = terms[d][c] + part * steps[d][c];
-                const float x1 = terms[3 + d][c] + part * steps[3 + d][c];
-                const float x2 = terms[6 + d][c] + part * steps[6 + d][c];
-                const float rest = terms[9 + d][c] + part * steps[9 + d][c];
-                const float found = x0 * r[c] + x1 * g[c] + x2 * b[c] + rest;
-                const float cleaned = filtered * found + own * by[c];
+                const float cleaned = scale[c] * found[c] + own * by[c];
                 to[c] = n[c] * cleaned;
             }
         }

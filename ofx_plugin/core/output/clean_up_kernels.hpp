@@ -12,13 +12,20 @@ constexpr int kCleanUpRows = 2 * kCleanUpReach + 1;
 /// Least variance, squared code values, that counts as an edge. Larger: the result is blurred.
 /// Smaller: noise and codec blocks return.
 constexpr double kCleanUpNoise = 4e-4;
+/// Filtered shares below this one fade out, to 0. Larger: soft edges become harder. Smaller:
+/// between two picks noise turns a colour on and off.
+constexpr float kCleanUpFaint = 0.1f;
+/// Above any share: a matte times an amount of a colour (pick_space.hpp).
+constexpr float kCleanUpMost = 2;
 
 /// What is summed over a cell, in this order: pixels, the guide (3), its products (6: rr, rg, rb,
-/// gg, gb, bb), the displacement (3), and its products with the guide (9, the guide's channel
-/// first).
-constexpr int kCleanUpGuideSums = 10, kCleanUpSums = 22;
-/// The displacement as a linear function of the guide: 9 slopes (as above), 3 constants.
-constexpr int kCleanUpTerms = 12;
+/// gg, gb, bb), the displacement and the share of PickKernels::set (4), and their products with the
+/// guide (12, the guide's channel first).
+constexpr int kCleanUpMoved = 4, kCleanUpGuideSums = 10;
+constexpr int kCleanUpSums = kCleanUpGuideSums + 4 * kCleanUpMoved;
+/// The displacement and the share as linear functions of the guide: 12 slopes (as above), 4
+/// constants.
+constexpr int kCleanUpTerms = 4 * kCleanUpMoved;
 
 /// The kernels of one instruction set. Each plane of a row has kCleanUpReach columns of zeros on
 /// both sides. `plane` is the distance from one plane to the next.
@@ -33,7 +40,7 @@ struct CleanUpKernels {
     /// Sets `guide` to colours within -1..2: as they are within 0..1, else nearer to it. Functions
     /// that are fitted beside a highlight would go far astray at it.
     void (*limit)(ConstChannels colour, Channels guide);
-    /// Sets `moved` to 0 where `counts` is 0. False when it is 0 everywhere.
+    /// Sets `moved` to 0 where `counts` is 0. False when the displacement is 0 everywhere.
     bool (*keep)(const float* counts, Channels moved);
     /// Adds pixels to the sums of the first `columns` of `cells` cells. Slot k * cells + c has
     /// pixel k of cell c, of `width` pixels in each. `counts` is 1 for a pixel that counts; others
@@ -55,7 +62,8 @@ struct CleanUpKernels {
         int cells, width;
     };
     /// Sets `change` to filtered * (the functions at the guide) + own * `moved`: 0 where `counts`
-    /// is.
+    /// is. The functions are scaled as their share is to be within 0..kCleanUpMost: fitted to a red
+    /// thing, they would move a white one beside it the other way.
     void (*apply)(const Nodes& nodes, ConstChannels guide, ConstChannels moved, const float* counts,
                   float filtered, float own, Channels change);
 

@@ -203,10 +203,11 @@ PALETTE4D_INLINE int reach(const typename PickPlan<T>::Grid& grid, Channels<cons
 }
 
 /// Adds to `sum` what a pick does to the colours from `at` on. Where several picks share a colour,
-/// its sum is weighted, and `shares` has the sum of the weights.
+/// its sum is weighted, and `weights` has the sum of the weights. `shares`, if it is not null, gets
+/// the share.
 template <bool alone, class T>
 PALETTE4D_INLINE void add_pick(const typename PickPlan<T>::One& pick, const Read<T>& read, int at,
-                               Channels<T> sum, T* shares) {
+                               Channels<T> sum, T* shares, T* weights) {
     const Lanes<T> one = all(T(1)), least = all(static_cast<T>(palette4d::kLeastLight));
     const Lanes<T> hue = max(all(pick.along[0]) * load(read.chroma[0] + at) +
                                  all(pick.along[1]) * load(read.chroma[1] + at),
@@ -227,12 +228,13 @@ PALETTE4D_INLINE void add_pick(const typename PickPlan<T>::One& pick, const Read
         const Lanes<T> weight =
             matte * all(pick.strength) /
             (u * u + v * v + l * l + all(static_cast<T>(palette4d::kNearestPick)));
-        store(shares + at, load(shares + at) + weight);
+        store(weights + at, load(weights + at) + weight);
         share = share * weight;
     }
     for (int c = 0; c < 3; ++c) {
         store(sum[c] + at, load(sum[c] + at) + share * all(pick.change[c]));
     }
+    if (shares) store(shares + at, load(shares + at) + share);
 }
 
 template <class T>
@@ -242,8 +244,9 @@ PALETTE4D_INLINE void clear(Channels<T> rows, int row_count, int count) {
     }
 }
 
-/// Adds what the picks do to `moved`. False when they do nothing.
-template <class T>
+/// Adds what the picks do to `moved`, and with `shares` their share to its fourth row. False when
+/// they do nothing.
+template <bool shares, class T>
 PALETTE4D_INLINE bool add_picks(const PickPlan<T>& plan, Channels<const T> shown, int count,
                                 Read<T>& read, Channels<T> moved) {
     constexpr int n = Lanes<T>::kCount;
@@ -251,23 +254,26 @@ PALETTE4D_INLINE bool add_picks(const PickPlan<T>& plan, Channels<const T> shown
     if (plan.count == 1) {
         const int found = reach<T>(plan.picks[0].matte, shown, count, read, reached);
         for (int i = 0; i < found; ++i) {
-            add_pick<true, T>(plan.picks[0], read, reached[i], moved, nullptr);
+            add_pick<true, T>(plan.picks[0], read, reached[i], moved, shares ? moved[3] : nullptr,
+                              nullptr);
         }
         return found > 0;
     }
-    alignas(64) T sum[4][kSize];  // channels, shares
-    clear<T>(sum, 4, count);
+    alignas(64) T sum[5][kSize];  // channels, shares, weights
+    clear<T>(sum, 5, count);
     bool some = false;
     for (int k = 0; k < plan.count; ++k) {
         const typename PickPlan<T>::One& pick = plan.picks[k];
         const int found = reach<T>(pick.matte, shown, count, read, reached);
-        for (int i = 0; i < found; ++i) add_pick<false, T>(pick, read, reached[i], sum, sum[3]);
+        for (int i = 0; i < found; ++i) {
+            add_pick<false, T>(pick, read, reached[i], sum, shares ? sum[3] : nullptr, sum[4]);
+        }
         some |= found > 0;
     }
     if (!some) return false;
     for (int at = 0; at < count; at += n) {
-        const Lanes<T> scale = all(T(1)) / max(load(sum[3] + at), all(static_cast<T>(1e-30)));
-        for (int c = 0; c < 3; ++c) {
+        const Lanes<T> scale = all(T(1)) / max(load(sum[4] + at), all(static_cast<T>(1e-30)));
+        for (int c = 0; c < (shares ? 4 : 3); ++c) {
             store(moved[c] + at, load(moved[c] + at) + load(sum[c] + at) * scale);
         }
     }
@@ -300,33 +306,23 @@ void add(const PickPlan<T>& plan, Channels<const T> colour, Channels<T> moved, i
             }
         }
     }
-    add_picks<T>(plan, shown, count, read, moved);
+    add_picks<false, T>(plan, shown, count, read, moved);
 }
 
 bool set(const PickPlan<float>& plan, Channels<const float> colour, Channels<float> moved,
          int count) {
     Read<float> read;
     Channels<const float> shown = read_colours<float>(plan, colour, count, read);
-    const Lanes<float> zero = all(0.0f), one = all(1.0f);
-    clear<float>(moved, 3, count);
-    bool some = add_picks<float>(plan, shown, count, read, moved);
-    if (plan.left.values) {
-        for (int at = 0; at < count; at += Lanes<float>::kCount) store(moved[3] + at, one);
-        int reached[kSize];
-        const int found = reach<float>(plan.left, shown, count, read, reached);
-        for (int i = 0; i < found; ++i)
-            store(moved[3] + reached[i], value_at(plan.left, read, reached[i], 1.0f));
-        some = true;
-    }
+    const Lanes<float> zero = all(0.0f);
+    clear<float>(moved, 4, count);
+    const bool some = add_picks<true, float>(plan, shown, count, read, moved);
     for (int at = 0; some && at < count; at += Lanes<float>::kCount) {
         // NaN where a channel is not finite: 0 times infinity is NaN.
         const Lanes<float> finite =
             zero * load(colour[0] + at) + zero * load(colour[1] + at) + zero * load(colour[2] + at);
-        for (int c = 0; c < 3; ++c) {
+        for (int c = 0; c < 4; ++c) {
             store(moved[c] + at, select(finite >= zero, load(moved[c] + at), zero));
         }
-        store(moved[3] + at,
-              plan.left.values ? select(finite >= zero, load(moved[3] + at), one) : one);
     }
     return some;
 }

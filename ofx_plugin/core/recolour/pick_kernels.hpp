@@ -53,9 +53,9 @@ struct PickKernels {
                        Channels<float> moved, int count);
     void (*add_twofold)(const PickPlan<double>& plan, Channels<const double> colour,
                         Channels<double> moved, int count);
-    /// Sets `moved` to what picks do; NaN and infinity do not move. Its fourth row is what holds
-    /// leave of the palette's changes. False when no colour moves and none is held; the fourth row
-    /// then stays as it is.
+    /// Sets `moved` to what picks do; NaN and infinity do not move. Its fourth row is the share of
+    /// their changes that is done: a matte times an amount, the mean where several picks share a
+    /// colour. False when no colour moves.
     bool (*set)(const PickPlan<float>& plan, Channels<const float> colour, Channels<float> moved,
                 int count);
 
