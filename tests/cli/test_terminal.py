@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import PyOpenColorIO as ocio
 import pytest
 
 from palette4d.cli.main import main
@@ -84,6 +85,23 @@ def test_steps_and_notes_begin_no_line(
     path.write_text(json.dumps(document), encoding="utf-8")
     assert main(["edit", str(path), *words.split()]) == 0
     printed = capsys.readouterr().out
+    assert FORGED in printed
+    assert not any(line.startswith(FORGED) for line in printed.splitlines())
+
+
+def test_a_colour_space_begins_no_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    config = ocio.Config.CreateFromBuiltinConfig("ocio://default")
+    config.addColorSpace(ocio.ColorSpace(name=f"a\n{FORGED}"))
+    Path("config.ocio").write_text(config.serialize(), encoding="utf-8")
+    document: dict[str, Any] = json.loads(EDITED.read_text(encoding="utf-8"))
+    document["clip"]["encoding"] = f"a\n{FORGED}"
+    Path("hostile.p4d.json").write_text(json.dumps(document), encoding="utf-8")
+    words = ["bake", "hostile.p4d.json", "--frame", "3", "-o", "o.cube", "--space", "ACEScct"]
+    assert main([*words, "--ocio-config", "config.ocio"]) == 0
+    printed = "".join(capsys.readouterr())
     assert FORGED in printed
     assert not any(line.startswith(FORGED) for line in printed.splitlines())
 

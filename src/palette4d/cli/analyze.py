@@ -17,7 +17,7 @@ from palette4d.cli.reading import add_reading, clip_name
 from palette4d.cli.terminal import option_of, tell
 from palette4d.common.arguments import checked, frame_range, whole
 from palette4d.common.errors import Palette4dError
-from palette4d.common.text import counted, quoted
+from palette4d.common.text import counted, on_lines, quoted
 
 USAGE = "palette4d analyze CLIP -o OUT [options]"
 
@@ -227,7 +227,7 @@ def run(args: argparse.Namespace) -> int:
         seconds = {"seconds": bars.seconds, "cpu_seconds": round(time.process_time(), 3)}
         print(json.dumps({"sidecar": str(args.output)} | document.report | seconds, indent=2))
     elif not args.quiet:
-        print("\n".join(analysis_report.lines(document, bars.seconds)))
+        print("\n".join(on_lines(analysis_report.lines(document, bars.seconds))))
         colours = counted(len(document.grade.tracks), "palette colour")
         handles = counted(len(document.fields()["polytope"]["vertices"]), "handle")
         print(f"wrote {args.output}: {colours} through time, {handles}")

@@ -11,7 +11,7 @@ from palette4d.cli.terminal import tell
 from palette4d.cli.worker_options import add_worker_options
 from palette4d.common.arguments import whole
 from palette4d.common.errors import Message, UnfinishedError
-from palette4d.common.text import counted
+from palette4d.common.text import counted, on_lines
 from palette4d.shows.timeline_files import is_timeline
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def run(args: argparse.Namespace, settings: dict[str, Any]) -> int:
     if args.json:
         print(done.path.read_text(encoding="utf-8"), end="")
     elif not args.quiet:
-        print("\n".join(report(done)))
+        print("\n".join(on_lines(list(report(done)))))
     if failed:
         raise failed
     return 0

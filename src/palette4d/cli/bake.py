@@ -15,6 +15,7 @@ from palette4d.cli.lut_options import add_lut_options, lut_settings, wide_help
 from palette4d.cli.terminal import tell
 from palette4d.common.arguments import number
 from palette4d.common.errors import Arg, WriteError
+from palette4d.common.text import on_lines
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -90,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(asdict(result), indent=2), file=out)
     else:
-        print("\n".join(report(result)), file=out)
+        print("\n".join(on_lines(list(report(result)))), file=out)
     if result.clip is None:
         tell(
             args,

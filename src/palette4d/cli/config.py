@@ -12,6 +12,7 @@ from palette4d.cli.export import add_frame_choice, add_run_options, export_setti
 from palette4d.cli.lut_options import add_lut_options, wide_help
 from palette4d.cli.progress import frames_bar
 from palette4d.cli.terminal import tell
+from palette4d.common.text import on_lines
 
 if TYPE_CHECKING:
     from palette4d.lut_export.config import WrittenConfig
@@ -76,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(as_json(done), indent=2))
     elif not args.quiet:
-        print("\n".join(report(done)))
+        print("\n".join(on_lines(list(report(done)))))
     for note in done.notes:
         tell(args, "note", note)
     return 0

@@ -13,7 +13,7 @@ from palette4d.cli.terminal import tell
 from palette4d.cli.worker_options import add_worker_options
 from palette4d.common.arguments import frame_range, whole
 from palette4d.common.errors import UnfinishedError
-from palette4d.common.text import counted
+from palette4d.common.text import counted, on_lines
 
 if TYPE_CHECKING:
     from palette4d.lut_export.series import Series
@@ -138,7 +138,7 @@ def run(args: argparse.Namespace) -> int:
             if written is not None:
                 print(f"{written}: a CDL for each of {counted(len(done.series), 'shot')}")
         for series_of_shot in done.series:
-            print("\n".join(report(series_of_shot)))
+            print("\n".join(on_lines(list(report(series_of_shot)))))
     warn(args, done.series)
     if failed:
         raise failed
