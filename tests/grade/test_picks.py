@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from grade.test_answer import document_of
 
 from palette4d.grade import mattes, pick_edits
 from palette4d.grade.clip_colours import ClipColours
@@ -79,3 +80,13 @@ def test_readings_are_taken_by_the_pick_that_they_are_of() -> None:
             ("pick", "p1"): replace(own, matte=matte)
         }
     assert with_readings({}, readings) == {}
+
+
+def test_another_pixel_without_a_box_is_that_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
+    picture = np.tile(np.float32([0.4, 0.4, 0.4]), (20, 30, 1))
+    picture[10, 20] = 0.8, 0.3, 0.2
+    document = document_of(monkeypatch, picture)
+    document.pick(0, pixel=(5, 5), box=5, to=(0.3, 0.4, 0.6))
+    document.change_pick("p1", pixel=(20, 10))
+    pick = document.grade.pick("p1")
+    assert (pick.box, pick.rgb) == (1, pytest.approx((0.8, 0.3, 0.2), abs=0.04))

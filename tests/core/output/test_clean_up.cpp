@@ -143,19 +143,20 @@ TEST(threads_change_nothing) {
 TEST(all_instruction_sets_filter_alike) {
     constexpr int kPlane = 100 + 2 * kCleanUpReach;
     Random random(5);
-    alignas(64) float colour[3][64], moved[3][64], counts[64];
+    alignas(64) float colour[3][64], moved[kCleanUpMoved][64], counts[64];
     for (int i = 0; i < 64; ++i) {
         for (int c = 0; c < 3; ++c) {
             colour[c][i] = i % 7 == 0 ? kNan : static_cast<float>(random.uniform(-1, 3));
             moved[c][i] = static_cast<float>(random.uniform(-1, 1));
         }
+        moved[3][i] = static_cast<float>(random.uniform(0, 2));
     }
     std::vector<std::vector<double>> results;
     for (const InstructionSet set : instruction_sets()) {
         const auto& kernels = kernels_of<CleanUpKernels>(set);
-        float own[3][64], kept[3][64];
+        float own[3][64], kept[kCleanUpMoved][64];
         std::copy_n(&colour[0][0], 192, &own[0][0]);
-        std::copy_n(&moved[0][0], 192, &kept[0][0]);
+        std::copy_n(&moved[0][0], 64 * kCleanUpMoved, &kept[0][0]);
         kernels.check(own, nullptr, counts);
         kernels.limit(own, own);
         CHECK(kernels.keep(counts, kept));
