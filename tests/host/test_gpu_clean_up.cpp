@@ -2,6 +2,8 @@
 // threads.
 #include <algorithm>
 #include <atomic>
+#include <functional>
+#include <map>
 #include <thread>
 
 #include "gpu_node.hpp"
