@@ -218,13 +218,14 @@ def test_where_the_kernel_cannot_on_is_an_error_and_auto_goes_on(
         sandbox.wanted()
 
 
-def script(tmp_path: Path, *lines: str) -> subprocess.Popen[str]:
+def script(tmp_path: Path, *lines: str, replaces: str = "the file itself") -> subprocess.Popen[str]:
     """A program that has a writer for `out.mov` in the folder `out`."""
     text = [
         *("import os, sys, time", "from pathlib import Path", f"os.chdir({str(tmp_path)!r})"),
         *("from palette4d.common import files, writer", "Path('out').mkdir(exist_ok=True)"),
         "from palette4d.common.errors import Palette4dError",
-        "with writer.writer_for(writer.Promise.of_file(Path('out/out.mov'))) as own:",
+        f"promise = writer.Promise.of_file(Path('out/out.mov'), {replaces!r})",
+        "with writer.writer_for(promise) as own:",
         *(f"    {line}" for line in lines),
     ]
     return subprocess.Popen(
@@ -260,6 +261,35 @@ def test_the_writer_refuses_what_the_command_was_not_begun_for(tmp_path: Path) -
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["out.mov"]
     assert (tmp_path / "out" / "out.mov").read_text() == "a movie"
     assert (tmp_path / "secret").read_text() == "secret"
+
+
+@forks
+@pytest.mark.parametrize(
+    ("replaces", "placed"),
+    [
+        ("none", ["new"]),
+        ("the file itself", ["out", "new"]),
+        ("all", ["out", "other", "new"]),
+    ],
+)
+def test_the_writer_replaces_what_the_command_may(
+    tmp_path: Path, replaces: str, placed: list[str]
+) -> None:
+    (tmp_path / "out").mkdir()
+    for name in ("out", "other"):
+        (tmp_path / "out" / f"{name}.mov").write_text("the user's")
+    with script(
+        tmp_path,
+        "for name in ('out', 'other', 'new'):",
+        "    (own.folder / 'x').write_text('evil')",
+        "    try:",
+        "        own.ask('place', 'x', str(Path(f'out/{name}.mov').absolute()), True)",
+        "        print(name)",
+        "    except Palette4dError:",
+        "        pass",
+        replaces=replaces,
+    ) as done:
+        assert done.communicate(timeout=60)[0].split() == placed
 
 
 @forks

@@ -75,7 +75,9 @@ def _needs(args: argparse.Namespace) -> Needs | None:
     if args.verb in ("render", "plot", "bake"):
         output = Path(args.output)
         parts = sandbox.parts(output.parent, {output.suffix.lower().lstrip(".")})
-        return Needs(Promise.of_file(output), [Path(args.sidecar)], args.clip, list(parts))
+        forced = args.force or getattr(args, "skip_existing", False)
+        writes = Promise.of_file(output, "all" if forced else "none")
+        return Needs(writes, [Path(args.sidecar)], args.clip, list(parts))
     if args.verb == "edit" and args.action in READING:
         return _of_edit(args)
     return None

@@ -21,7 +21,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Literal
 
 from palette4d.common import files, locking
 from palette4d.common.errors import Palette4dError
@@ -37,21 +37,25 @@ class Promise:
     ending : of their names.
     below : whether folders in it belong to it.
     linked : the file itself, or that to which it is a link, whatever its name.
+    replaces : which files that exist it may replace.
     """
 
     folder: Path
     ending: str
     below: bool = False
     linked: Path | None = None
+    replaces: Literal["all", "the file itself", "none"] = "all"
 
     @classmethod
-    def of_file(cls, path: Path) -> Promise:
+    def of_file(
+        cls, path: Path, replaces: Literal["all", "the file itself", "none"] = "the file itself"
+    ) -> Promise:
         """Return the promise to write a file, or others of its kind beside it."""
         whole = path.name.endswith(".p4d.json")
         suffix = ".p4d.json" if whole else path.suffix or path.name
         with contextlib.suppress(Palette4dError, OSError):  # the write says so
-            return cls(path.parent, suffix, linked=files.link_target(path))
-        return cls(path.parent, suffix)
+            return cls(path.parent, suffix, linked=files.link_target(path), replaces=replaces)
+        return cls(path.parent, suffix, replaces=replaces)
 
     def holds(self, path: Path) -> bool:
         """Whether a file's path is among those that were promised."""
@@ -61,6 +65,12 @@ class Promise:
             return False
         own, there = os.path.realpath(self.folder), Path(os.path.realpath(path.parent))
         return there.is_relative_to(own) if self.below else str(there) == own
+
+    def may_replace(self, path: Path) -> bool:
+        """Whether a file may be replaced, if it exists."""
+        if self.replaces == "the file itself":
+            return self.linked is not None and files.same_file(path, self.linked)
+        return self.replaces == "all"
 
     def leads_to(self, folder: Path) -> bool:
         """Whether a folder may be made: this one, one on the way to it, or one in it."""
@@ -219,7 +229,7 @@ def _taken(folder: Path, name: str) -> Path:
 def _place(taken: Path, path: Path, force: bool, promise: Promise) -> None:
     if not promise.holds(path) or not stat.S_ISREG(taken.lstat().st_mode):
         raise _unasked(path)
-    with files.replacing(path, force=force) as own:
+    with files.replacing(path, force=force and promise.may_replace(path)) as own:
         taken.chmod(stat.S_IMODE(own.stat().st_mode))  # its maker may have made it setuid
         shutil.move(taken, own)
 
