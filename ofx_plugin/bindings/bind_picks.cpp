@@ -101,7 +101,6 @@ py::dict learn(const std::vector<GivenFrame>& given, const Vec3& picked,
     py::dict result;
     result["odds"] = grid_array(matte.odds);
     result["found"] = learned.found;
-    result["share"] = learned.share;
     return result;
 }
 

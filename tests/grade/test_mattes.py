@@ -209,18 +209,18 @@ def test_a_frame_of_nothing() -> None:
 
 def test_text_is_a_zlib_stream_of_differences() -> None:
     odds = _core.hue_matte((0.7, 0.2, 0.1))
-    learned, other = (mattes.Learned(each.reshape(-1), True, 0.5) for each in (odds, 126 - odds))
+    learned, other = (mattes.Learned(each.reshape(-1), True) for each in (odds, 126 - odds))
     steps = np.frombuffer(zlib.decompress(base64.b64decode(learned.text)), np.uint8)
     np.testing.assert_array_equal(np.cumsum(steps, dtype=np.uint8), odds.reshape(-1))
     np.testing.assert_array_equal(mattes.odds_of(learned.text), odds.reshape(-1))
-    assert learned.id == mattes.Learned(learned.odds.copy(), True, 0.5).id != other.id
+    assert learned.id == mattes.Learned(learned.odds.copy(), True).id != other.id
 
 
 def test_a_colour_of_two_things_is_whose_it_more_certainly_is() -> None:
     own, other = np.array([100, 80, 63], np.uint8), np.array([40, 90, 120], np.uint8)
-    left = mattes.Learned(own, True, 0.5).against([other])
+    left = mattes.Learned(own, True).against([other])
     np.testing.assert_array_equal(left.odds, [100, 40, 0])
-    assert mattes.Learned(own, True, 0.5).against([]).odds is own
+    assert mattes.Learned(own, True).against([]).odds is own
 
 
 def test_a_learned_matte_is_small(document: Document) -> None:
@@ -245,7 +245,7 @@ def test_other_encodings_lead_to_display_code_values(encoding: str) -> None:
 
 
 def test_a_log_clip_is_told_apart_as_its_picture_is(pictures: F32) -> None:
-    """The same pictures in ACEScct: the pick takes the same pixels."""
+    """The same pictures in ACEScct: the pick takes the same display colours."""
     curve = mattes.display_curve("ACEScct")
     assert curve is not None
     start, end, values = curve
@@ -258,8 +258,9 @@ def test_a_log_clip_is_told_apart_as_its_picture_is(pictures: F32) -> None:
         pick = Pick("p1", "pick", 0, (r, g, b), (0.1, 0.2, 0.7), pixel=CLICK, box=9)
         learned = mattes.learn(pick, (), [0], {0: image}.__getitem__, display)
         assert learned.seen
-        taken.append(learned.share)
-    assert taken[0] == pytest.approx(taken[1], rel=0.05)
+        taken.append(learned.odds > learned.odds.max() / 2)
+    either, both = np.any(taken, axis=0), np.all(taken, axis=0)
+    assert both.sum() > 0.95 * either.sum()
 
 
 def test_frames_that_a_hold_marks_are_read(pictures: F32) -> None:

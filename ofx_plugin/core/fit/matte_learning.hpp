@@ -36,8 +36,7 @@ struct LearningFrame {
 
 struct LearnedMatte {
     std::vector<float> membership;  ///< a MatteGrid, 0..1
-    double share = 0;               ///< of the first frame's pixels: the region
-    bool found = false;             ///< whether the first frame has any such region
+    bool found = false;             ///< whether the first frame has any region of the object
 };
 
 /// The first frame is the one that was clicked on. `picked` is the colour there, `holds` are

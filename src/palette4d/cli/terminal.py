@@ -76,12 +76,9 @@ def option_of(arg: Arg, parser: argparse.ArgumentParser) -> str:
         if action.const is not None and action.const == arg.value:
             return action.option_strings[-1]
     flags = [flag for action in ours for flag in action.option_strings if flag.startswith("--")]
-    flag = (
-        flags[-1 if arg.value is False else 0]
-        if flags
-        else f"--{'no-' * (value == 'False')}{name.replace('_', '-')}"
-    )
-    return f"{flag} {value}".rstrip()
+    elsewhere = name.replace("_", "-")  # an option of another verb or action
+    flags = flags or [f"--{elsewhere}", f"--no-{elsewhere}"]
+    return f"{flags[-1 if arg.value is False else 0]} {value}".rstrip()
 
 
 def field_of(arg: Arg) -> str | None:

@@ -125,7 +125,9 @@ def answer_to(grade: Grade, pick: Pick, clip: ClipOfPicks) -> Answer | None:
         for other in picks:
             it = _Thing.of(_View.of(grade, clip, other.frame), other, holds)
             if (cost := _cost(view, it, pick, without)) is not None:
-                notes += [_less(view, other, without), *cost]
+                now, before = (v.change(other).mean() for v in (view, view.under(without)))
+                words = f"{other.id} takes {percent(now)} of frame {view.frame}"
+                notes += [Note(f"{words}, {percent(before)} without it"), *cost]
         if picks and not notes:
             notes = [Note("no pick takes less by it: hold a place that one takes", warns=True)]
     else:
@@ -175,10 +177,6 @@ class _View:
         drawn = drawing.apply(self.rgb, precision="single")
         share = np.where(self.real, (drawn - self.rgb)[..., 0], 0)
         return np.clip(share, 0, 1).astype(np.float32)
-
-    def taken(self, pick: Pick) -> B:
-        """Return the pixels that a pick takes."""
-        return np.asarray(self.change(pick) > TAKEN)
 
     def points(self, rgb: NDArray[np.floating]) -> F64:
         """Return colours, (..., 3), as points of pick space."""
@@ -267,10 +265,10 @@ class _Thing:
         if not marks:
             return cls(view, grade, pick, marks, taken, none, none, None)
         marked, away = view.any_of(marks), thing.unlike(view.points(view.rgb), marks)
-        whole = thing.connected(_widened(taken), marked) & taken
+        whole = thing.connected(taken, marked, gap=4)
         for own, part in thing.joins(taken, marked, away, SAME_COLOUR, int(OTHERS * taken.size)):
             after = free.after(pick, "hold", view.place(part))
-            if after is not None and _parted(before, after, part, marks):
+            if after is not None and _parted(before, after, part, own):
                 return cls(view, grade, pick, marks, own, whole & ~own, part, away)
         return cls(view, grade, pick, marks, whole, none, none, away)
 
@@ -281,11 +279,9 @@ class _Thing:
         return self.own & thing.nearer(self.away, self.view.any_of(self.marks), others)
 
 
-def _parted(before: F32, after: F32, part: B, marks: Sequence[B]) -> bool:
-    """Return whether a hold takes most of a part's change, and hardly any of what was marked."""
-    return _lost(before, after, part) > 0.5 and all(
-        _lost(before, after, mark) <= COST for mark in marks
-    )
+def _parted(before: F32, after: F32, part: B, own: B) -> bool:
+    """Return whether a hold takes most of a part's change, and much less of the thing's own."""
+    return _lost(before, after, part) > max(0.5, 2 * _lost(before, after, own))
 
 
 def _lost(before: F32, after: F32, part: B) -> float:
@@ -316,14 +312,6 @@ def _unmarked(it: _Thing) -> Iterator[Note]:
                 there.place(left),
                 warns=True,
             )
-
-
-def _less(view: _View, pick: Pick, without: Grade) -> Note:
-    """Report what a pick takes with a hold and without it."""
-    now, before = (float(v.change(pick).mean()) for v in (view, view.under(without)))
-    return Note(
-        f"{pick.id} takes {percent(now)} of frame {view.frame}, {percent(before)} without it"
-    )
 
 
 def _cost(view: _View, it: _Thing, hold: Pick, without: Grade) -> list[Note] | None:
@@ -359,13 +347,13 @@ def _cost(view: _View, it: _Thing, hold: Pick, without: Grade) -> list[Note] | N
 
 def _shared(view: _View, pick: Pick, picks: Sequence[Pick]) -> Iterator[Note]:
     """Report earlier picks that take the same pixels, and change them otherwise."""
-    taken, ids = view.taken(pick), [each.id for each in view.grade.picks]
+    taken, ids = view.change(pick) > TAKEN, [each.id for each in view.grade.picks]
     shares = {}
     for other in picks:
         unlike = np.linalg.norm(pick.change_at(view.frame) - other.change_at(view.frame))
         if ids.index(other.id) > ids.index(pick.id) or unlike < ALIKE:
             continue
-        share = float((taken & view.taken(other)).sum() / max(taken.sum(), 1))
+        share = float((taken & (view.change(other) > TAKEN)).sum() / max(taken.sum(), 1))
         if share > SHARED:
             shares[other.id] = percent(share)
     if shares:
@@ -380,10 +368,12 @@ def _shared(view: _View, pick: Pick, picks: Sequence[Pick]) -> Iterator[Note]:
 
 def _also(it: _Thing) -> Iterator[Note]:
     """Report what the pick takes beside the thing, the largest first."""
+    from scipy import ndimage
+
     pick, view = it.pick, it.view
-    change = view.change(pick)
+    change = left = view.change(pick)
     taken = change > TAKEN
-    odd = _opened(taken & (view.hue(pick) > HUE))
+    odd = ndimage.binary_opening(taken & (view.hue(pick) > HUE), iterations=2)  # without rims
     beside, elsewhere = (taken & where & ~odd for where in (it.beside, ~(it.own | it.beside)))
     flood = change[beside].sum() > change[it.own & ~odd].sum()
     kinds = [
@@ -397,28 +387,19 @@ def _also(it: _Thing) -> Iterator[Note]:
     for words, others in sorted(kinds, key=lambda kind: -change[kind[1]].sum()):
         if (share := float(change[others].sum() / change.size)) <= OTHERS:
             return
+        if _lost(change, left, others) > 0.5:
+            continue  # a hold that is proposed helps here too
         touches = others is beside
         spot = others & it.joined if touches and (others & it.joined).any() else others
         spot = largest_part(spot)[0]
         place = view.place(spot)
         note = Note(f"{words}, {percent(share)}", place, id=pick.id, warns=bool(touches and flood))
-        after = view.after(pick, "hold", place)
-        if after is not None and _parted(change, after, spot, it.marks):
-            cost = _lost(change, after, it.side(spot) & ~others)
+        after, own = view.after(pick, "hold", place), it.side(spot) & ~others
+        if after is not None and _parted(change, after, spot, own):
+            cost = _lost(change, after, own)
             if cost <= COST or touches:
                 note = note.proposing("hold", after, cost)
+            if cost <= COST:
+                left = np.minimum(left, after)
         if note.gesture or others is not odd:
             yield note
-
-
-def _opened(mask: B) -> B:
-    """Return a mask without rims and single pixels."""
-    from scipy import ndimage
-
-    return np.asarray(ndimage.binary_opening(mask, iterations=2))
-
-
-def _widened(mask: B) -> B:
-    from scipy import ndimage
-
-    return np.asarray(ndimage.binary_dilation(mask, iterations=4))

@@ -45,13 +45,11 @@ BRIGHTEST = 2.0
 class Learned:
     """A learned matte: its id, and its text in the sidecar.
 
-    `seen` says whether the frame has pixels of the colour; `share` is the share of its pixels that
-    are connected with what was clicked on.
+    `seen` says whether the frame has pixels of the colour.
     """
 
     odds: Bytes
     seen: bool
-    share: float
 
     def against(self, others: Sequence[Bytes]) -> Learned:
         """Return the matte without what is more certainly in others."""
@@ -106,7 +104,7 @@ def learn(
         holds=[tuple(hold.colour_at(pick.frame).tolist()) for hold in holds if not hold.marks],
         display=display,
     )
-    return Learned(learned["odds"].reshape(-1), learned["found"], learned["share"])
+    return Learned(learned["odds"].reshape(-1), learned["found"])
 
 
 def _brushes(pick: Pick, frame: int, frames: Sequence[int]) -> list[Brush]:

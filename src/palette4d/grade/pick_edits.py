@@ -130,8 +130,8 @@ def add_area(grade: Grade, clip: ClipOfPicks, id: str, area: Area) -> Grade:
     old = grade.pick(id)
     if old.whole_hue:
         raise Palette4dError(
-            f"{id} takes all of its hue, and learns nothing from areas: end that first, with "
-            f"{Arg('whole_hue', False)}, or pick there too"
+            f"{id} takes all of its hue, and learns nothing from areas: change it with "
+            f"{Arg('whole_hue', False)} first, or pick there too"
         )
     grade.check_frame(area.frame)
     if clip.missing:

@@ -43,13 +43,13 @@ def unlike(points: F64, marks: Sequence[B]) -> F64:
     return np.asarray(np.min(away, axis=0))
 
 
-def connected(mask: B, marked: B) -> B:
-    """Return what of a mask is connected with marked pixels."""
+def connected(mask: B, marked: B, gap: int = 0) -> B:
+    """Return what of a mask is connected with marked pixels, across gaps of 2 `gap` pixels."""
     from scipy import ndimage
 
-    labels, _ = ndimage.label(mask)
+    labels, _ = ndimage.label(ndimage.binary_dilation(mask, iterations=gap) if gap else mask)
     kept = np.unique(labels[marked])
-    return np.asarray(np.isin(labels, kept[kept > 0]))
+    return np.asarray(np.isin(labels, kept[kept > 0]) & mask)
 
 
 def joins(taken: B, marked: B, away: F64, near: float, least: int) -> Iterator[tuple[B, B]]:

@@ -94,7 +94,7 @@ class Drafts(SessionView):
         if made.matte is None:
             return Unread(place.colour)
         odds = odds_of(document.grade.mattes[made.matte])
-        return Unread(place.colour, Learned(odds, True, 0.0))
+        return Unread(place.colour, Learned(odds, True))
 
     def _failed(self, place: Place, error: Exception) -> None:
         if self.place is place:
