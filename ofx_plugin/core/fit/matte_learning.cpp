@@ -181,8 +181,10 @@ LearnedMatte learn_matte(const std::vector<LearningFrame>& frames, const Vec3& p
             const double others = static_cast<double>(count) - 1;
             add_frame(all, view, parts, n > 0 ? 0.5 / others : others > 0 ? 0.5 : 1.0);
             if (n > 0 || round + 1 < kRounds) continue;
-            learned.found =
-                std::find(parts.region.begin(), parts.region.end(), 1) != parts.region.end();
+            double area = 0;
+            for (const std::uint8_t inside : parts.region) area += inside;
+            learned.share = area / static_cast<double>(view.size());
+            learned.found = area > 0;
         }
         const Grid object = blurred(std::move(all.object)),
                    background = blurred(std::move(all.background)),

@@ -36,7 +36,8 @@ struct LearningFrame {
 
 struct LearnedMatte {
     std::vector<float> membership;  ///< a MatteGrid, 0..1
-    bool found = false;             ///< whether the first frame has any region of the object
+    double share = 0;               ///< of the first frame's pixels: the region
+    bool found = false;             ///< whether the first frame has any such region
 };
 
 /// The first frame is the one that was clicked on. `picked` is the colour there, `holds` are
