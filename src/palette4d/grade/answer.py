@@ -375,25 +375,24 @@ def _also(it: _Thing) -> Iterator[Note]:
     taken = change > TAKEN
     odd = ndimage.binary_opening(taken & (view.hue(pick) > HUE), iterations=2)  # without rims
     beside, elsewhere = (taken & where & ~odd for where in (it.beside, ~(it.own | it.beside)))
-    flood = change[beside].sum() > change[it.own & ~odd].sum()
+    flood = bool(change[beside].sum() > change[it.own & ~odd].sum())
+    touching = "takes more beside the thing than of it" if flood else "also takes what touches it"
     kinds = [
         ("also takes another hue", odd),
-        (
-            "takes more beside the thing than of it" if flood else "also takes what touches it",
-            beside,
-        ),
+        (touching, beside),
         ("also takes its colour elsewhere", elsewhere),
     ]
     for words, others in sorted(kinds, key=lambda kind: -change[kind[1]].sum()):
         if (share := float(change[others].sum() / change.size)) <= OTHERS:
             return
-        if _lost(change, left, others) > 0.5:
-            continue  # a hold that is proposed helps here too
         touches = others is beside
+        warns = touches and flood
+        if not warns and _lost(change, left, others) > 0.5:
+            continue  # a hold that is proposed helps here too
         spot = others & it.joined if touches and (others & it.joined).any() else others
         spot = largest_part(spot)[0]
         place = view.place(spot)
-        note = Note(f"{words}, {percent(share)}", place, id=pick.id, warns=bool(touches and flood))
+        note = Note(f"{words}, {percent(share)}", place, id=pick.id, warns=warns)
         after, own = view.after(pick, "hold", place), it.side(spot) & ~others
         if after is not None and _parted(change, after, spot, own):
             cost = _lost(change, after, own)
