@@ -380,7 +380,7 @@ def _noted(note: Note) -> Iterator[str]:
     pixel = f"{place.pixel[0]},{place.pixel[1]}"
     yield f"{text}: {hex_of(place.rgb)} at {pixel}"
     if note.gesture:
-        what = "to keep it: hold"
+        what = "if it is another thing: hold"
         if note.gesture == "area":
             what = f"if it belongs to the thing: area {note.id}"
         where = f"--frame {place.frame} --pixel {pixel} --box {place.box}"

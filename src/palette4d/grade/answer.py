@@ -340,7 +340,7 @@ def _cost(view: _View, it: _Thing, hold: Pick, without: Grade) -> list[Note] | N
             if np.minimum(gained, lost).sum() >= max(gained.sum(), lost.sum()) / 2:
                 note = Note(f"{words}, most of it", place, id=pick.id, warns=True)
                 return [note.proposing("area", after)]
-        words += " (remove it, or hold another place), most of it"
+        words += " (if that belongs to the thing, remove it or hold another place), most of it"
         return [Note(words, place, id=pick.id, warns=True)]
     return []
 
@@ -376,10 +376,9 @@ def _also(it: _Thing) -> Iterator[Note]:
     odd = ndimage.binary_opening(taken & (view.hue(pick) > HUE), iterations=2)  # without rims
     beside, elsewhere = (taken & where & ~odd for where in (it.beside, ~(it.own | it.beside)))
     flood = bool(change[beside].sum() > change[it.own & ~odd].sum())
-    touching = "takes more beside the thing than of it" if flood else "also takes what touches it"
     kinds = [
         ("also takes another hue", odd),
-        (touching, beside),
+        ("also takes what touches it and looks otherwise", beside),
         ("also takes its colour elsewhere", elsewhere),
     ]
     for words, others in sorted(kinds, key=lambda kind: -change[kind[1]].sum()):
