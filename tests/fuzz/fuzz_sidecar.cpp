@@ -10,6 +10,7 @@
 #include "model/lineage.hpp"
 #include "model/ramps.hpp"
 #include "recolour/recolour.hpp"
+#include "sidecar/clip_name.hpp"
 #include "sidecar/sidecar.hpp"
 
 namespace {
@@ -36,12 +37,27 @@ void use(const Sidecar& sidecar, const Edits& edits, double frame, bool with_pic
     }
 }
 
+/// The other readers of text: of a conversion's steps, and of a path, which leads to no sidecar.
+void read_otherwise(const std::string& text) {
+    try {
+        parse_conversion(text, "fuzz");
+    } catch (const SidecarError&) {
+    }
+    try {
+        read_sidecar(text);
+        std::abort();
+    } catch (const SidecarError&) {
+    }
+}
+
 }  // namespace
 
 std::string outcome_of(const std::uint8_t* data, std::size_t size) {
     const std::string text(reinterpret_cast<const char*>(data), size);
+    if (size < 1000) read_otherwise(text);
     try {
         const Sidecar sidecar = parse_sidecar(text, "fuzz");
+        if (file_safe(clip_name(sidecar.clip.source)).size() > kLongestName) std::abort();
         const double first = sidecar.polytope.first_frame(), last = sidecar.polytope.last_frame();
         for (const double part : {0.0, 0.31, 0.5, 1.0, 2.0}) {
             try {
