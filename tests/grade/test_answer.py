@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -107,6 +109,22 @@ def test_a_larger_thing_that_touches_is_warned_of(monkeypatch: pytest.MonkeyPatc
     assert found.share < before.share / 2
     costs = note(again(document, hold.id), "of its thing")
     assert (costs is None) == ("less of the thing" not in told.effect)
+
+
+def test_a_hold_that_costs_the_lit_part_of_a_dark_thing_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = 0.7 * RED
+    picture[30:90, 60:140] = picture[30:90, 165:190] = 0.95, 0.35, 0.33
+    document = document_of(monkeypatch, picture)
+    document.pick(0, pixel=(40.0, 60.0), box=9, to="#2040b0", reach=2)
+    hold = document.hold(0, pixel=(178.0, 60.0), box=9, follow=False)
+    costs = note(again(document, hold.id), "of its thing")
+    assert costs is not None
+    share = re.search(r"(\d+) %", costs.words)
+    assert share is not None
+    assert int(share[1]) > 50  # two thirds are lit
 
 
 @pytest.mark.parametrize("kind", ["wall", "mottled", "shaded"])

@@ -272,11 +272,11 @@ class _Thing:
                 return cls(view, grade, pick, marks, own, whole & ~own, part, away)
         return cls(view, grade, pick, marks, whole, none, none, away)
 
-    def side(self, others: B) -> B:
-        """Return the part of the thing that is not nearer to other pixels."""
+    def side(self, part: B, others: B) -> B:
+        """Return what of a part is not nearer to other pixels than to the marks."""
         if self.away is None or not others.any():
-            return self.own
-        return self.own & thing.nearer(self.away, self.view.any_of(self.marks), others)
+            return part
+        return part & thing.nearer(self.away, self.view.any_of(self.marks), others)
 
 
 def _parted(before: F32, after: F32, part: B, own: B) -> bool:
@@ -326,7 +326,9 @@ def _cost(view: _View, it: _Thing, hold: Pick, without: Grade) -> list[Note] | N
     areas = [(area, _View.of(view.grade, view.clip, area.frame)) for area in pick.marks]
     parts = [(words, seen, seen.mark(area)) for area, seen in areas]
     held = there.any_of(there.marks(hold.marks))
-    parts.append((f"{hold.id} also costs {pick.id} {{}} of its thing", there, it.side(held)))
+    # What touches the thing may be its other shade.
+    whole = it.side(it.own | it.beside, held)
+    parts.append((f"{hold.id} also costs {pick.id} {{}} of its thing", there, whole))
     for words, there, part in parts:
         before, now = there.under(without).change(pick), there.change(pick)
         if (share := _lost(before, now, part)) <= COST:
@@ -392,7 +394,7 @@ def _also(it: _Thing) -> Iterator[Note]:
         spot = largest_part(spot)[0]
         place = view.place(spot)
         note = Note(f"{words}, {percent(share)}", place, id=pick.id, warns=warns)
-        after, own = view.after(pick, "hold", place), it.side(spot) & ~others
+        after, own = view.after(pick, "hold", place), it.side(it.own, spot) & ~others
         if after is not None and _parted(change, after, spot, own):
             cost = _lost(change, after, own)
             if cost <= COST or touches:
