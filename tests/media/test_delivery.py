@@ -148,8 +148,8 @@ def test_super_whites_and_sub_blacks_survive(tmp_path):
     [("yuv420p10le", "h264", True), ("yuv420p", "h264", False), ("yuv420p10le", "hevc", False)],
 )
 def test_fewer_bits_are_noted(tmp_path, layout, codec, fewer):
-    encoder = "libx265" if "10" in layout else "libx264"
-    source = movie(tmp_path / "s.mp4", list(tiles()), encoder, layout)
+    # x265 has written a header that FFmpeg refused, late in a process that had done much else.
+    source = movie(tmp_path / "s.mp4", list(tiles()), "libx264", layout)
     done = render(source, tmp_path / "o.mp4", codec=codec)
     assert any("10 bits" in note for note in done.notes) == fewer
 
