@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import dask
 import pytest
@@ -205,8 +206,8 @@ def test_a_worker_with_several_threads_does_one_piece_at_a_time(tmp_path: Path) 
         Workers(cluster=made.address).run(piece, tasks, found.__setitem__)
         told: dict[int, object] = {}
 
-        def take(key: int, answer: object) -> None:
-            told[key] = answer.text if isinstance(answer, Failed) else int(answer)  # type: ignore
+        def take(key: int, answer: Any) -> None:
+            told[key] = answer.text if isinstance(answer, Failed) else int(answer)
 
         Workers(cluster=made.address).run(lie, {i: i for i in (1, 2, 3, 4)}, take)
     assert (told[1], told[4]) == (1, 16)
