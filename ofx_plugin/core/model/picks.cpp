@@ -9,21 +9,30 @@ namespace palette4d {
 namespace {
 
 /// The keys around a frame, and the weight of the later one.
+template <class Key>
 struct Around {
-    const PathKey *before, *after;
+    const Key *before, *after;
     double weight;
 };
-Around around(const std::vector<PathKey>& path, double frame) {
+template <class Key>
+Around<Key> around(const std::vector<Key>& keys, double frame) {
     const auto after =
-        std::upper_bound(path.begin(), path.end(), frame,
-                         [](double time, const PathKey& key) { return time < key.frame; });
-    if (after == path.begin()) return {&path.front(), &path.front(), 0};
-    if (after == path.end()) return {&path.back(), &path.back(), 0};
-    const PathKey& before = *(after - 1);
+        std::upper_bound(keys.begin(), keys.end(), frame,
+                         [](double time, const Key& key) { return time < key.frame; });
+    if (after == keys.begin()) return {&keys.front(), &keys.front(), 0};
+    if (after == keys.end()) return {&keys.back(), &keys.back(), 0};
+    const Key& before = *(after - 1);
     return {&before, &*after, (frame - before.frame) / (after->frame - before.frame)};
 }
 
 }  // namespace
+
+PickWindow::Box PickWindow::box_at(double at) const {
+    const auto [before, after, weight] = around(keys, at);
+    Box box = before->box;
+    for (std::size_t i = 0; i < box.size(); ++i) box[i] += weight * (after->box[i] - box[i]);
+    return box;
+}
 
 const Matte& HueMatte::get() const {
     std::call_once(once_, [this] { matte_ = hue_matte(display_); });

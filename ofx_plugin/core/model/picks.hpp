@@ -1,6 +1,7 @@
 // Picks and holds: colours of the clip that change or stay, as the user asked.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -32,6 +33,20 @@ private:
     mutable Matte matte_;
 };
 
+/// The part of the picture that a pick changes: a box that moves over time, and its soft surround.
+struct PickWindow {
+    /// Left, top, right and bottom, in pixels of the clip from its top left corner.
+    using Box = std::array<double, 4>;
+    struct Key {
+        double frame;
+        Box box;
+    };
+    double feather;         ///< how far the change fades out beyond the box, in pixels
+    std::vector<Key> keys;  ///< at least one, in order; linear between
+
+    Box box_at(double frame) const;
+};
+
 struct Pick {
     std::string id;
     bool hold = false;  ///< the colour stays; else it becomes `to`
@@ -48,6 +63,7 @@ struct Pick {
     double reach = 0;                     ///< log odds added to the matte
     double softness = 0.5;                ///< 0 a hard matte, 1 a soft one
     double darkest = 0, lightest = 1;     ///< the display lightness that the pick takes
+    std::optional<PickWindow> window;     ///< none: the whole picture
     int levels = 0;  ///< values of the matte where it was picked, for small exports; 0: all
 
     /// The learned matte, else that of the hue. Throws std::invalid_argument without either.

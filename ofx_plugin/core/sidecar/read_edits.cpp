@@ -57,6 +57,8 @@ void check_colours(const Cursor& colours) {
 Edits read_edits(const Cursor& where, const Polytope& polytope, const PickMattes& mattes) {
     Edits edits;
     edits.frame_step = mattes.frame_step;
+    edits.width = mattes.width;
+    edits.height = mattes.height;
     edits.vertex_rgb.resize(polytope.vertices().size());
     edits.vertex_ramp.resize(edits.vertex_rgb.size());
     edits.default_ramp = read_ramp(where).value_or(Ramp::kLinear);

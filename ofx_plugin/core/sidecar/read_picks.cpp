@@ -24,6 +24,23 @@ struct Counts {
     std::size_t keys = 0, points = 0;
 };
 
+PickWindow read_window(const Cursor& where, Counts& counts) {
+    PickWindow window{where.member("feather").number(), {}};
+    const Cursor keys = where.member("keys");
+    keys.limit(counts.keys += keys.size(), kMaxPathKeys, "colours and boxes over time in all");
+    std::optional<double> previous;
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+        const Cursor key = keys.element(i), box = key.member("box");
+        PickWindow::Key read{key.member("frame").later(previous), {}};
+        for (std::size_t side = 0; side < 4; ++side) read.box[side] = box.element(side).number();
+        if (!(read.box[0] < read.box[2] && read.box[1] < read.box[3])) {
+            box.wrong("a left edge before the right one, and a top above the bottom");
+        }
+        window.keys.push_back(read);
+    }
+    return window;
+}
+
 Pick read_pick(const Cursor& where, const PickMattes& mattes, Counts& counts) {
     const Json& fields = where.json();
     const auto number = [&](const char* name, double without) {
@@ -47,7 +64,7 @@ Pick read_pick(const Cursor& where, const PickMattes& mattes, Counts& counts) {
     pick.enabled = fields.value("enabled", true);
     if (where.has("path")) {
         const Cursor path = where.member("path");
-        path.limit(counts.keys += path.size(), kMaxPathKeys, "colours over time in all");
+        path.limit(counts.keys += path.size(), kMaxPathKeys, "colours and boxes over time in all");
         std::optional<double> previous;
         for (std::size_t i = 0; i < path.size(); ++i) {
             const Cursor key = path.element(i);
@@ -71,6 +88,11 @@ Pick read_pick(const Cursor& where, const PickMattes& mattes, Counts& counts) {
         if (!(pick.darkest < pick.lightest)) {
             range.wrong("a lowest lightness below the highest one");
         }
+    }
+    if (where.has("window")) {
+        const Cursor window = where.member("window");
+        if (pick.hold) window.wrong("no window of a hold: picks alone have one");
+        pick.window = read_window(window, counts);
     }
     if (where.has("matte")) {
         const Cursor name = where.member("matte");

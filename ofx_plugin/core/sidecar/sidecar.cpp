@@ -54,6 +54,8 @@ Sidecar sidecar_of(const Json& members, const std::string& name) {
     PickMattes& mattes = sidecar.mattes;
     if (root.has("mattes")) mattes = read_mattes(root.member("mattes"), {});
     mattes.frame_step = static_cast<double>(sidecar.clip.step);
+    mattes.width = static_cast<double>(sidecar.clip.width);
+    mattes.height = static_cast<double>(sidecar.clip.height);
     sidecar.edits = read_edits(root.member("edits"), sidecar.polytope, mattes);
     if (root.has("versions")) {
         sidecar.versions = read_versions(root.member("versions"), sidecar.polytope, mattes);
@@ -73,6 +75,8 @@ Sidecar with_edits(const Sidecar& palette, const Json& edits, const Json& mattes
     }
     result.mattes = read_mattes(root.member("mattes"), palette.mattes);
     result.mattes.frame_step = palette.mattes.frame_step;
+    result.mattes.width = palette.mattes.width;
+    result.mattes.height = palette.mattes.height;
     result.edits = read_edits(root.member("edits"), palette.polytope, result.mattes);
     return result;
 }

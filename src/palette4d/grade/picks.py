@@ -34,9 +34,15 @@ ALIKE = 0.08
 MOST_REACH = 8.0
 
 
+#: The largest number of pixels in a window's sides and feather.
+MOST_PIXELS = 1e6
+
 #: Attributes with other names in a sidecar, and those that are frames or pixels.
 _NAMES = {"start": "from"}
-_WHOLE = {"frame", "start", "until", "fade", "fade_out", "pixel", "points", "radius"}
+_WHOLE = {
+    *("frame", "start", "until", "fade", "fade_out"),
+    *("pixel", "points", "radius", "feather", "box"),
+}
 
 
 @dataclass(frozen=True)
@@ -63,6 +69,39 @@ class Area:
     frame: float
     points: tuple[tuple[float, float], ...]
     radius: float
+
+
+Box = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class WindowKey:
+    """A window's box at a frame; `given` by the user, or followed.
+
+    `box` is left, top, right and bottom, in pixels from the clip's top left corner.
+    """
+
+    frame: float
+    box: Box
+    given: bool = False
+
+
+@dataclass(frozen=True)
+class Window:
+    """The part of the picture that a pick changes: a box that moves over time.
+
+    Beyond the box the change fades out over `feather` pixels. `keys` are in order of time; the box
+    is linear between them.
+    """
+
+    feather: float
+    keys: tuple[WindowKey, ...]
+
+    def box_at(self, frame: float) -> F64:
+        """Return the box at a frame, (4,)."""
+        frames = [key.frame for key in self.keys]
+        sides = np.array([key.box for key in self.keys]).T
+        return np.array([np.interp(frame, frames, side) for side in sides])
 
 
 @dataclass(frozen=True)
@@ -104,6 +143,8 @@ class Pick:
         How soft the matte is, 0..1.
     lightness : (float, float)
         The lowest and the highest lightness (largest channel, display code values) that change.
+    window : Window or None
+        The part of the picture that changes; None: all of it.
     """
 
     id: str
@@ -126,6 +167,7 @@ class Pick:
     reach: float = 0.0
     softness: float = 0.5
     lightness: tuple[float, float] = (0.0, 1.0)
+    window: Window | None = None
 
     @classmethod
     def from_fields(cls, fields: Mapping[str, Any]) -> Pick:
@@ -141,6 +183,9 @@ class Pick:
             if name in values:
                 values[name] = (values[name][0], values[name][1])
         path, areas = values.pop("path", ()), values.pop("areas", ())
+        if window := values.pop("window", None):
+            keys = (WindowKey(**{**key, "box": tuple(key["box"])}) for key in window["keys"])
+            values["window"] = Window(window["feather"], tuple(keys))
         return cls(
             **values,
             path=tuple(PathKey(**{**key, "rgb": as_colour(key["rgb"])}) for key in path),
@@ -285,11 +330,32 @@ def check(pick: Pick, frames: tuple[int, int, int]) -> None:
             f"found the lightness {lowest:g} to {highest:g}, expected a lowest below a highest, "
             "both within 0 to 1"
         )
+    if pick.window is not None:
+        _check_window(pick.window)
     if pick.toward not in ("shift", "colour"):
         raise Palette4dError(f"found toward {pick.toward!r}, expected 'shift' or 'colour'")
 
 
-def _fields_of(thing: Pick | PathKey | Area) -> dict[str, Any]:
+def _check_window(window: Window) -> None:
+    if not 0 <= window.feather <= MOST_PIXELS:
+        raise Palette4dError(
+            f"found a feather of {window.feather:g} pixels, expected 0 to {MOST_PIXELS:g}"
+        )
+    for key in window.keys:
+        left, top, right, bottom = key.box
+        if not (-MOST_PIXELS <= left < right <= MOST_PIXELS):
+            raise Palette4dError(
+                f"found a window from {left:g} to {right:g} from the left, expected a left edge "
+                "before the right one"
+            )
+        if not (-MOST_PIXELS <= top < bottom <= MOST_PIXELS):
+            raise Palette4dError(
+                f"found a window from {top:g} to {bottom:g} from the top, expected a top above the "
+                "bottom"
+            )
+
+
+def _fields_of(thing: Pick | PathKey | Area | Window | WindowKey) -> dict[str, Any]:
     values = {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing)}
     left_out = {f.name for f in dataclasses.fields(thing) if values[f.name] == f.default}
     return {
@@ -303,6 +369,6 @@ def _plain(value: Any, whole: bool) -> Any:
     """Return a JSON value; whole numbers become int, so that the file has 40 and not 40.0."""
     if isinstance(value, tuple):
         return [_plain(part, whole) for part in value]
-    if isinstance(value, PathKey | Area):
+    if isinstance(value, PathKey | Area | Window | WindowKey):
         return _fields_of(value)
     return int(value) if whole and float(value).is_integer() else value
