@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -54,9 +55,15 @@ std::shared_ptr<const DisplayCurve> curve_from(const py::object& object) {
     return std::make_shared<const DisplayCurve>(DisplayCurve{from, to, values});
 }
 
+using GivenWindow = std::optional<std::tuple<PickWindow::Box, double>>;
+
 FramePicks frame_picks(const std::vector<std::tuple<Vec3, Vec3, double, FloatArray>>& picks,
-                       const py::object& left, const py::object& display) {
+                       const py::object& left, const py::object& display,
+                       const std::vector<GivenWindow>& windows, const std::array<double, 2>& size) {
     FramePicks result;
+    if (!windows.empty() && windows.size() != picks.size()) {
+        throw py::value_error("windows: expected one for each pick, or none");
+    }
     for (const auto& [colour, change, strength, matte] : picks) {
         result.picks.push_back({colour, change, strength,
                                 std::make_shared<const FrameMatte>(grid_from(matte, "matte"))});
@@ -65,7 +72,51 @@ FramePicks frame_picks(const std::vector<std::tuple<Vec3, Vec3, double, FloatArr
         result.left =
             std::make_shared<const FrameMatte>(grid_from(left.cast<FloatArray>(), "left"));
     }
+    for (std::size_t i = 0; i < windows.size(); ++i) {
+        if (!windows[i]) continue;
+        const auto& [box, feather] = *windows[i];
+        result.picks[i].window.emplace(PickWindow{feather, {{0, box}}}, 0);
+    }
+    result.width = size[0];
+    result.height = size[1];
     result.display = curve_from(display);
+    return result;
+}
+
+FramePicks with_changes(const FramePicks& self, const std::vector<Vec3>& changes) {
+    if (changes.size() != self.picks.size()) {
+        throw py::value_error("changes: expected one for each pick");
+    }
+    FramePicks result = self;
+    for (std::size_t i = 0; i < changes.size(); ++i) result.picks[i].change = changes[i];
+    return result;
+}
+
+FramePicks of_part(const FramePicks& self, const PickWindow::Box& part) {
+    if (!(part[0] < part[2] && part[1] < part[3])) {
+        throw py::value_error("part: expected left < right and top < bottom");
+    }
+    FramePicks result = self;
+    result.width = part[2] - part[0];
+    result.height = part[3] - part[1];
+    for (FramePick& pick : result.picks) {
+        if (!pick.window) continue;
+        for (std::size_t i = 0; i < 4; ++i) {
+            pick.window->box[i] = static_cast<float>(pick.window->box[i] - part[i % 2]);
+        }
+    }
+    return result;
+}
+
+py::list windows_of(const FramePicks& self) {
+    py::list result;
+    for (const FramePick& pick : self.picks) {
+        if (pick.window) {
+            result.append(py::make_tuple(pick.window->box, pick.window->feather));
+        } else {
+            result.append(py::none());
+        }
+    }
     return result;
 }
 
@@ -119,9 +170,16 @@ void bind_picks(py::module_& module) {
     py::class_<FramePicks, std::shared_ptr<FramePicks>>(
         module, "FramePicks", "The picks and holds of one frame, for a Recolourer.")
         .def(py::init(&frame_picks), py::arg("picks"), py::kw_only(), py::arg("left") = py::none(),
-             py::arg("display") = py::none(),
+             py::arg("display") = py::none(), py::arg("windows") = std::vector<GivenWindow>(),
+             py::arg("size") = std::array<double, 2>{1, 1},
              "(colour, change, strength, (96, 96, 16) float32) of each pick; what holds leave of "
-             "the palette's changes; (from, to, values) of a curve to display code values.")
+             "the palette's changes; (from, to, values) of a curve to display code values; each "
+             "pick's window, or None: (left, top, right, bottom) and a feather, in pixels; the "
+             "clip's width and height.")
+        .def("with_changes", &with_changes, py::arg("changes"), "The same picks with others.")
+        .def("of_part", &of_part, py::arg("part"),
+             "The same picks of a part of the picture: (left, top, right, bottom), in pixels.")
+        .def_property_readonly("windows", &windows_of)
         .def_property_readonly("count", [](const FramePicks& self) { return self.picks.size(); })
         .def_property_readonly(
             "largest",

@@ -7,6 +7,7 @@
 
 #include "arrays.hpp"
 #include "binders.hpp"
+#include "output/clean_up.hpp"
 #include "recolour/recolour.hpp"
 
 using namespace palette4d;
@@ -46,7 +47,8 @@ InstructionSet instructions_from(const std::string& name) {
 
 py::array apply(const Recolourer& self, const py::array& image, double strength, bool premultiplied,
                 int threads, const py::object& out, const std::string& precision,
-                const std::string& instructions, const ColourConversion* conversion) {
+                const std::string& instructions, const ColourConversion* conversion,
+                bool picture) {
     require_image(image, "image");
     py::array result;
     if (out.is_none()) {
@@ -70,12 +72,16 @@ py::array apply(const Recolourer& self, const py::array& image, double strength,
     }
     const auto in_view = view_of<ConstImageView>(image, static_cast<const float*>(image.data()));
     const auto out_view = view_of<ImageView>(result, static_cast<float*>(result.mutable_data()));
-    const RecolourOptions options{strength,
-                                  premultiplied,
-                                  threads,
-                                  precision_from(precision),
-                                  instructions_from(instructions),
-                                  conversion};
+    RecolourOptions options{strength,
+                            premultiplied,
+                            threads,
+                            precision_from(precision),
+                            instructions_from(instructions),
+                            conversion};
+    if (picture) {
+        const Area whole{0, 0, in_view.width, in_view.height};
+        options.place = image_place(whole, 0, in_view.height - 1, -1, self.picks());
+    }
     {
         const py::gil_scoped_release unlocked;
         self.apply(in_view, out_view, options);
@@ -133,8 +139,9 @@ void bind_recolour(py::module_& module) {
         .def("apply", &apply, py::arg("image"), py::kw_only(), py::arg("strength") = 1.0,
              py::arg("premultiplied") = false, py::arg("threads") = 1, py::arg("out") = py::none(),
              py::arg("precision") = "double", py::arg("instructions") = "best",
-             py::arg("conversion") = py::none(),
-             "(h, w, 3 or 4) float32 in and out; threads 0 means one per processor.");
+             py::arg("conversion") = py::none(), py::arg("picture") = false,
+             "(h, w, 3 or 4) float32 in and out; threads 0 means one per processor. `picture`: the "
+             "image is all of the clip's picture, so that windows of picks count.");
     module.def("straight_colours", &straight_colours, py::arg("image"), py::kw_only(),
                py::arg("premultiplied"),
                "(h, w, 3) float32 of (h, w, 3 or 4): divided by alpha where premultiplied.");

@@ -163,7 +163,25 @@ void add_grid(const FrameMatte& matte, float idle, Writer& to, std::vector<float
     }
 }
 
-void add_picks(const Recolourer& map, FrameTable& result) {
+/// Adds a pick's window: its sides and 1 / its feather, in pixels of the window that is drawn.
+void add_window(const std::optional<FrameWindow>& window, const FramePicks& picks,
+                const CleanUp::Place* place, Writer& to) {
+    if (!window || !place) {
+        constexpr double kFar = 1e15;
+        for (const double value : {-kFar, -kFar, kFar, kFar, 1.0, 1.0}) to.number(value);
+        return;
+    }
+    const ImagePlace at = image_place(place->picture, place->drawn.x1, place->drawn.y1, 1, picks);
+    const auto x = [&](float side) { return (side - at.x) / at.across + 0.5; };
+    const auto y = [&](float side) { return (side - at.y) / at.down + 0.5; };
+    const auto& [left, top, right, bottom] = window->box;
+    for (const double value : {x(left), y(bottom), x(right), y(top), at.across / window->feather,
+                               -at.down / window->feather}) {
+        to.number(value);
+    }
+}
+
+void add_picks(const Recolourer& map, const CleanUp::Place* place, FrameTable& result) {
     const FramePicks& picks = map.picks();
     const PickPlan<float> plan = map.plan().single.picks.plan();
     std::vector<float>& table = result.table;
@@ -182,6 +200,7 @@ void add_picks(const Recolourer& map, FrameTable& result) {
                                 one.along[1], one.plain,     one.dark,      one.bright,
                                 one.strength, one.change[0], one.change[1], one.change[2]};
         table.insert(table.end(), std::begin(values), std::end(values));
+        add_window(picks.picks[i].window, picks, place, to);
     }
     if (plan.display) {
         table[P4D_DISPLAY] = static_cast<float>(plan.display_count);
@@ -310,7 +329,7 @@ FrameTable frame_table(const Drawing& drawing, bool premultiplied, const CleanUp
             }
         }
     }
-    add_picks(*map, result);
+    add_picks(*map, place, result);
     if (drawing.conversion) add_conversion(*drawing.conversion, result);
     if (place && cleaned_map(drawing)) add_cells(*place, options.clean_up, result);
     return result;

@@ -197,6 +197,8 @@ class FramePicks:
     (96, 96, 16) float32 matte, 0 to 1, over two axes of saturation and lightness. `left` is such a
     grid too, of what holds leave of the palette's changes. `display` is (from, to, values): a curve
     from the palette's code values to those of a display, linear between evenly spaced values.
+    `windows` has each pick's (left, top, right, bottom) and feather, or None, in pixels of a clip
+    of this `size`, width and height.
 
     ValueError for another shape or a curve without a length.
     """
@@ -207,9 +209,17 @@ class FramePicks:
         *,
         left: F32 | None = ...,
         display: tuple[float, float, Sequence[float]] | None = ...,
+        windows: Sequence[tuple[Sequence[float], float] | None] = ...,
+        size: Sequence[float] = ...,
     ) -> None: ...
+    def with_changes(self, changes: Sequence[Sequence[float]]) -> FramePicks:
+        """The same picks with other changes, one for each."""
     @property
     def picks(self) -> list[tuple[list[float], list[float], float, F32]]: ...
+    def of_part(self, part: tuple[float, float, float, float]) -> FramePicks:
+        """The same picks of a part of the picture: left, top, right and bottom, in pixels."""
+    @property
+    def windows(self) -> list[tuple[list[float], float] | None]: ...
     @property
     def count(self) -> int: ...
     @property
@@ -288,6 +298,7 @@ class Recolourer:
         precision: Literal["single", "double"] = ...,
         instructions: str = ...,
         conversion: ColourConversion | None = ...,
+        picture: bool = ...,
     ) -> F32:
         """(h, w, 3 or 4) float32 in and out; threads 0 means one per processor.
 
@@ -295,7 +306,8 @@ class Recolourer:
         may be `image` itself. `precision` "single" is what the node and `palette4d render` use:
         some twenty times as fast as "double" (the default) and within 1e-4 of it. `instructions`
         is "best" or one of `instruction_sets`; the result is the same. With a `conversion` the
-        image is in the clip's numbers, and the palette in those that it leads to.
+        image is in the clip's numbers, and the palette in those that it leads to. Windows of picks
+        count only where the image is a `picture`: all of the clip's, at any size.
         """
 
 def draw(

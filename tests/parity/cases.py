@@ -92,6 +92,12 @@ def pick(name: str, rgb: Colour, to: Colour, **more: Any) -> dict[str, Any]:
     return {"id": name, "kind": "pick", "frame": 0, "rgb": list(rgb), "to": list(to), **more}
 
 
+def window(feather: float, *keys: tuple[float, tuple[float, ...]]) -> dict[str, Any]:
+    """A window of a pick; its keys are a frame and a box."""
+    boxes = [{"frame": frame, "box": list(box)} for frame, box in keys]
+    return {"feather": feather, "keys": boxes}
+
+
 def hold(name: str, rgb: Colour, **more: Any) -> dict[str, Any]:
     """A hold of a colour."""
     return {**pick(name, rgb, rgb, **more), "kind": "hold"}
@@ -308,6 +314,14 @@ def picked_documents() -> dict[str, Document]:
             {"a": learned_odds(1), "b": learned_odds(2), "c": learned_odds(3)},
         ),
         "colour-picks": picked(colour, [moving, black, fading]),
+        "still-window": picked(still, [{**red, "window": window(9, (0, (5, 8, 40, 30.25)))}]),
+        # A hard edge, a round spot, one beyond the picture, and one that moves beside one without.
+        "changes-windows": picked(
+            edited(changes, {"d1": (0.3, 0.0, 0.7)}, []),
+            [{**red, "window": window(0, (0, (20.5, 0, 64, 18)))},
+             {**moving, "window": window(30, (0, (9, 9, 10, 10)), (20, (40, 20, 60, 30)))},
+             {**green, "window": window(4, (0, (-50, -20, 33, 90)))}, pale],
+        ),
         "colour-curve": picked(colour, [red, fading], None, (-0.25, 1.5, log)),
         "changes-picks": picked(
             edited(changes, {"d1": (0.3, 0.0, 0.7)}, [("ea", 9, (0.0, 0.2, 0.1))], ramp="smooth"),

@@ -113,6 +113,7 @@ class Core:
             premultiplied=premultiplied,
             precision=self.precision,
             instructions=self.instructions,
+            picture=True,
         )
 
 

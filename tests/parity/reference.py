@@ -230,6 +230,7 @@ class Picked:
     change: F64
     strength: float
     matte: F32
+    window: tuple[F64, float] | None = None  # left, top, right, bottom; the feather
 
 
 @dataclass(frozen=True)
@@ -239,6 +240,7 @@ class Picks:
     picks: list[Picked] = field(default_factory=list)
     left: F32 | None = None
     curve: tuple[float, float, list[float]] | None = None
+    size: tuple[float, float] = (1, 1)
 
 
 def shown(colour: ArrayLike, curve: tuple[float, float, list[float]] | None) -> F64:
@@ -437,8 +439,29 @@ def picks_at(document: Document, frame: float) -> Picks:
                     share = np.where(around(point(now)), share, 1 - kept.astype(float))
                 spared *= 1 - how_much * (1 - share)
             matte = matte * spared.astype(np.float32)
-            found.append(Picked(colour, change_of(pick, frame), strength, matte))
-    return Picks(found, left, curve)
+            found.append(
+                Picked(colour, change_of(pick, frame), strength, matte, window_of(pick, frame))
+            )
+    return Picks(found, left, curve, document["clip"]["size"])
+
+
+def window_of(pick: Document, frame: float) -> tuple[F64, float] | None:
+    """A pick's window at a frame."""
+    if "window" not in pick:
+        return None
+    keys = pick["window"]["keys"]
+    boxes = np.array([key["box"] for key in keys], float)
+    times = [key["frame"] for key in keys]
+    return np.array([np.interp(frame, times, side) for side in boxes.T]), pick["window"]["feather"]
+
+
+def in_window(window: tuple[F64, float] | None, x: float, y: float) -> float:
+    """What a window leaves of a pick at a place: 1 in the box, 0 from the feather on."""
+    if window is None:
+        return 1
+    (left, top, right, bottom), feather = window
+    away = np.hypot(max(left - x, x - right, 0), max(top - y, y - bottom, 0))
+    return float((1 - min(away / max(feather, 1), 1) ** 2) ** 2)
 
 
 # Weights -----------------------------------------------------------------------------------------
@@ -613,12 +636,12 @@ def recolour(
 
     missing = [pick.strength * (pick.change - held(pick.colour)) for pick in picks.picks]
 
-    def moved_by_picks(colour: F64) -> F64:
+    def moved_by_picks(colour: F64, x: float, y: float) -> F64:
         total, shares = np.zeros(3), []
         display = shown(colour, picks.curve)
         for pick, change in zip(picks.picks, missing, strict=True):
             target = shown(pick.colour, picks.curve)
-            matte = float(between(pick.matte, point(display)))
+            matte = float(between(pick.matte, point(display))) * in_window(pick.window, x, y)
             near = matte * pick.strength / (apart2(point(display), point(target)) + 1e-6)
             share = near if len(picks.picks) > 1 else 1.0
             part = matte * amount(display, target) / amount(target, target)
@@ -627,6 +650,7 @@ def recolour(
         return total / max(sum(shares), 1e-30)
 
     result = image.copy()
+    across, down = picks.size[0] / image.shape[1], picks.size[1] / image.shape[0]
     for y in range(image.shape[0]):
         for x in range(image.shape[1]):
             p = image[y, x, :3].astype(float)
@@ -636,7 +660,9 @@ def recolour(
             own = straight(p, alpha)
             if not np.isfinite(own).all():
                 continue
-            moved = alpha * strength * (held(own) + moved_by_picks(own))
+            # The image is the whole picture.
+            place = (x + 0.5) * across, (y + 0.5) * down
+            moved = alpha * strength * (held(own) + moved_by_picks(own, *place))
             for channel in range(3):
                 if moved[channel] != 0:
                     result[y, x, channel] = np.float32(p[channel] + moved[channel])

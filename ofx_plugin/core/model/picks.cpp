@@ -34,6 +34,19 @@ PickWindow::Box PickWindow::box_at(double at) const {
     return box;
 }
 
+FrameWindow::FrameWindow(const PickWindow& window, double frame)
+    : feather(std::max(window.feather, kLeastFeather)) {
+    const PickWindow::Box exact = window.box_at(frame);
+    for (std::size_t i = 0; i < box.size(); ++i) box[i] = static_cast<float>(exact[i]);
+}
+
+double FrameWindow::at(const Spot& spot) const {
+    const double x = std::max({box[0] - spot.x, spot.x - box[2], 0.0f});
+    const double y = std::max({box[1] - spot.y, spot.y - box[3], 0.0f});
+    const double left = 1 - std::min((x * x + y * y) / (feather * feather), 1.0);
+    return left * left;
+}
+
 const Matte& HueMatte::get() const {
     std::call_once(once_, [this] { matte_ = hue_matte(display_); });
     return matte_;

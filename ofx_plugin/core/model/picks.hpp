@@ -47,6 +47,25 @@ struct PickWindow {
     Box box_at(double frame) const;
 };
 
+/// The middle of a pixel, in pixels of the clip from its top left corner. Single precision, so that
+/// all kernels read the same.
+struct Spot {
+    float x, y;
+};
+
+/// A window at a frame.
+struct FrameWindow {
+    FrameWindow(const PickWindow& window, double frame);
+
+    std::array<float, 4> box;
+    double feather;
+
+    /// What it leaves of a pick: 1 in the box, 0 from the feather on.
+    double at(const Spot& spot) const;
+};
+/// The least feather in pixels: narrower edges have steps.
+inline constexpr double kLeastFeather = 1;
+
 struct Pick {
     std::string id;
     bool hold = false;  ///< the colour stays; else it becomes `to`

@@ -78,6 +78,16 @@ void to_slots(const float* pixels, int width, int cells, float (*planes)[kInBloc
 
 }  // namespace
 
+ImagePlace image_place(const Area& picture, int x, int y, int step, const FramePicks& picks) {
+    const auto size = [](int low, int high) {
+        return std::max(static_cast<double>(high) - low, 1.0);
+    };
+    const double across = picks.width / size(picture.x1, picture.x2);
+    const double down = picks.height / size(picture.y1, picture.y2);
+    return {(static_cast<double>(x) - picture.x1 + 0.5) * across,
+            (static_cast<double>(picture.y2) - y - 0.5) * down, across, -step * down};
+}
+
 int clean_up_cell(double scale) {
     const double side = std::isfinite(scale) ? std::round(kCell * scale) : kCell;
     return static_cast<int>(std::clamp(side, 1.0, static_cast<double>(kMostCell)));
@@ -89,13 +99,14 @@ int clean_up_support(int cell) { return (2 * kAround + 2) * cell; }
 struct CleanUp::Block {
     alignas(64) float colour[4][kInBlock];  ///< and alpha, where it divides
     alignas(64) float guide[3][kInBlock];
+    alignas(64) float place[2][kInBlock];  ///< for windows
     alignas(64) float moved[kCleanUpMoved][kInBlock];  ///< what picks do, and their share
     alignas(
         64) float counts[kInBlock];  ///< 1 where there is a pixel that can be recoloured, else 0
     bool some;                       ///< picks move some of them
 };
 
-bool CleanUp::load(const float* row, int row_x, int row_end, int x, Block& block) const {
+bool CleanUp::load(const float* row, int row_x, int row_end, int x, int y, Block& block) const {
     const int width = place_.cell_width, slots = cells_ * width;
     if (!conversion_ && x >= row_x && row_end - x >= slots) {
         const float* const from = row + static_cast<std::ptrdiff_t>(x - row_x) * format_.channels;
@@ -134,7 +145,17 @@ bool CleanUp::load(const float* row, int row_x, int row_end, int x, Block& block
         }
     }
     kernels_.limit(block.colour, block.guide);
-    block.some = set_picks_(picks_, block.colour, block.moved, kInBlock);
+    if (windows_) {
+        const ImagePlace place = image_place(place_.picture, x, y, 1, map_->picks());
+        each_slot(width, cells_, [&](int slot, int pixel) {
+            const Spot spot = place.at(pixel, 0);
+            block.place[0][slot] = spot.x;
+            block.place[1][slot] = spot.y;
+        });
+        for (int i = slots; i < kInBlock; ++i) block.place[0][i] = block.place[1][i] = 0;
+    }
+    block.some = set_picks_(picks_, block.colour, windows_ ? block.place : nullptr, block.moved,
+                            kInBlock);
     if (!block.some) {
         for (int c = 0; c < kCleanUpMoved; ++c) std::fill_n(block.moved[c], kInBlock, 0.0f);
         return false;
@@ -224,7 +245,7 @@ private:
                 const std::int64_t x =
                     place.picture.x1 +
                     static_cast<std::int64_t>(of_.column1_ + column) * place.cell_width;
-                const bool some = of_.load(pixels, x1, x2, static_cast<int>(x), block_);
+                const bool some = of_.load(pixels, x1, x2, static_cast<int>(x), y, block_);
                 of_.kernels_.add(block_.guide, some ? block_.moved : nullptr, block_.counts,
                                  std::min(of_.cells_, columns_ - column), of_.cells_,
                                  place.cell_width, ring.planes.data() + kAround + column, plane_);
@@ -356,6 +377,7 @@ CleanUp::CleanUp(std::shared_ptr<const Recolourer> map,
       picks_(map_->plan().single.picks.plan()),
       set_picks_(kernels_of<PickKernels>(InstructionSet::kBest).set),
       place_(place),
+      windows_(map_->picks().windows()),
       cells_(kInBlock / place.cell_width) {
     const CleanUpCells region = clean_up_cells(place);
     place_.source = region.source;
@@ -425,7 +447,7 @@ bool CleanUp::change(const float* pixels, int x, int y, int count, double own,
             continue;
         }
         const std::int64_t start = left + half + node * width;
-        load(pixels, x, x + count, static_cast<int>(start), block);
+        load(pixels, x, x + count, static_cast<int>(start), y, block);
         CleanUpKernels::Nodes nodes{low + from,    high + from, columns, at.part,
                                     parts_.data(), cells_,      width};
         if (to - from != cells_) {

@@ -26,6 +26,10 @@ struct Area {
     int x1, y1, x2, y2;
 };
 
+/// The place of an image whose first pixel is (x, y) of a picture, whose rows go by `step` (1 or
+/// -1) upwards, and which is the whole clip's.
+ImagePlace image_place(const Area& picture, int x, int y, int step, const FramePicks& picks);
+
 /// The side of a cell in pixels, in a picture drawn at `scale` (1: full size).
 int clean_up_cell(double scale);
 /// Pixels that the filter sees on each side of a pixel, at most.
@@ -74,8 +78,8 @@ private:
         std::vector<char> some;          ///< for each block of cells, whether some are not 0
     };
 
-    /// Reads pixels of a row into slots; `x` is the first slot's, counted from the picture's left.
-    bool load(const float* row, int row_x, int row_end, int x, Block& block) const;
+    /// Reads pixels of row `y` into slots; `x` is the first slot's.
+    bool load(const float* row, int row_x, int row_end, int x, int y, Block& block) const;
 
     const std::shared_ptr<const Recolourer> map_;
     const std::shared_ptr<const ColourConversion> conversion_;
@@ -85,6 +89,7 @@ private:
     const PickPlan<float> picks_;
     decltype(PickKernels::set) const set_picks_;
     Place place_;
+    const bool windows_;
     const int cells_;                                      ///< in a block
     int column1_ = 0, column2_ = 0, row1_ = 0, row2_ = 0;  ///< cells that are summed
     int first_ = 0, last_ = 0;                             ///< rows of cells that are drawn from

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <thread>
 
 #include "model/vec3.hpp"
@@ -69,22 +70,24 @@ std::vector<float> straight_colours(const Pixels& pixels, const ColourConversion
 
 /// The weight of one colour; `read` is the colour plus the weight. The smallest channel is the most
 /// precise one; where it is large too, double precision is used.
-double weight_of(const float* colour, const float* read, const Recolourer& reader) {
+double weight_of(const float* colour, const float* read, const Recolourer& reader,
+                 const Spot* spot) {
     const auto smaller = [](float a, float b) { return std::abs(a) < std::abs(b); };
     const std::ptrdiff_t c = std::min_element(colour, colour + 3, smaller) - colour;
     if (std::abs(colour[c]) < kLarge) return static_cast<double>(read[c]) - colour[c];
-    const Vec3 exact = reader.displaced({colour[0], colour[1], colour[2]}, 1);
+    const Vec3 exact = reader.displaced({colour[0], colour[1], colour[2]}, 1, spot);
     return exact[static_cast<std::size_t>(c)] - colour[c];
 }
 
 /// The matte of one colour, 0 to 1; `read` is the colour plus what the reader adds, and `cleaned`
 /// what cleaning up adds to that.
-double matte_of(const float* colour, const float* read, float cleaned, const Drawing& drawing) {
+double matte_of(const float* colour, const float* read, const Spot* spot, float cleaned,
+                const Drawing& drawing) {
     const DrawingOptions& options = drawing.options;
     if (options.output == Output::kOutside && infinite(colour)) return 1;
     if (!finite_pixel(colour) || !finite_pixel(read)) return 0;
     if (options.output != Output::kOutside) {
-        return std::clamp(weight_of(colour, read, *drawing.reader) + cleaned, 0.0, 1.0);
+        return std::clamp(weight_of(colour, read, *drawing.reader, spot) + cleaned, 0.0, 1.0);
     }
     double square = 0;
     for (std::size_t c = 0; c < 3; ++c) {
@@ -92,6 +95,13 @@ double matte_of(const float* colour, const float* read, float cleaned, const Dra
         square += away * away;
     }
     return std::clamp((std::sqrt(square) - kAtSurface) / options.reach, 0.0, 1.0);
+}
+
+/// What apply() needs of a drawing to know where windows are.
+std::optional<ImagePlace> place_of(const Drawing& drawing, const Recolourer& map,
+                                   const RowPlace& place) {
+    if (!map.picks().windows()) return std::nullopt;
+    return image_place(drawing.picture, place.x, place.y, place.step, map.picks());
 }
 
 /// CleanUp::change() of all pixels; empty where it is 0 for all.
@@ -112,17 +122,23 @@ std::vector<float> changes_of(const Pixels& pixels, const Drawing& drawing, doub
 void draw_matte(const Pixels& pixels, const Drawing& drawing) {
     const std::vector<float> straight = straight_colours(pixels, drawing.conversion.get());
     std::vector<float> read(straight.size());
-    const auto width = static_cast<int>(pixels.count);
-    const auto stride = static_cast<std::ptrdiff_t>(straight.size() * sizeof(float));
-    drawing.reader->apply({straight.data(), width, 1, 3, stride},
-                          {read.data(), width, 1, 3, stride}, {});
+    RecolourOptions options;
+    options.place = place_of(drawing, *drawing.reader, pixels.place);
+    const auto all = static_cast<int>(pixels.count);
+    const int width = options.place ? pixels.place.width : all;
+    const auto stride = static_cast<std::ptrdiff_t>(3 * sizeof(float)) * width;
+    drawing.reader->apply({straight.data(), width, all / width, 3, stride},
+                          {read.data(), width, all / width, 3, stride}, options);
     const std::vector<float> cleaned = changes_of(pixels, drawing, -drawing.options.clean_up);
     const bool in_alpha = drawing.options.in_alpha && pixels.channels == 4;
     for (std::size_t i = 0; i < pixels.count; ++i) {
         const float* from = pixels.source + i * pixels.channels;
         float* to = pixels.result + i * pixels.channels;
         const float change = cleaned.empty() ? 0.0f : cleaned[i * 3];
-        const double matte = matte_of(&straight[i * 3], &read[i * 3], change, drawing);
+        const auto at = static_cast<int>(i);
+        const Spot spot = options.place ? options.place->at(at % width, at / width) : Spot{};
+        const double matte = matte_of(&straight[i * 3], &read[i * 3],
+                                      options.place ? &spot : nullptr, change, drawing);
         if (pixels.channels == 4) to[3] = from[3];
         const double alpha = pixels.premultiplied ? from[3] : 1.0;
         for (std::size_t c = 0; c < 3; ++c) {
@@ -169,6 +185,7 @@ void draw_cleaned(const ConstImageView& in, const ImageView& out, bool premultip
         RecolourOptions options;
         options.strength = drawing.options.strength;
         options.premultiplied = premultiplied;
+        options.place = place_of(drawing, *drawing.edit, place);
         drawing.edit->apply(in, out, options);
     } else {
         copy_rows(in, out);
@@ -208,6 +225,8 @@ void draw_converted(const ConstImageView& in, const ImageView& out, bool premult
         before = straight_colours(row, &conversion);
         after = before;
         if (drawing.edit->palette_moves()) {
+            options.place = place_of(drawing, *drawing.edit,
+                                     {place.x, place.y + place.step * y, in.width, place.step});
             drawing.edit->apply({before.data(), in.width, 1, 3, 0},
                                 {after.data(), in.width, 1, 3, 0}, options);
         }
@@ -272,6 +291,7 @@ void draw_edit(const ConstImageView& in, const ImageView& out, bool premultiplie
     options.strength = drawing.options.strength;
     options.premultiplied = premultiplied;
     options.conversion = drawing.conversion.get();
+    options.place = place_of(drawing, *drawing.edit, place);
     drawing.edit->apply(in, out, options);
 }
 
@@ -282,7 +302,8 @@ void draw_pixels(const Pixels& pixels, const Drawing& drawing) {
     } else {
         const auto channels = static_cast<int>(pixels.channels);
         const auto all = static_cast<int>(pixels.count);
-        const int width = drawing.clean_up ? pixels.place.width : all;
+        const bool rows = drawing.clean_up || (drawing.edit && drawing.edit->picks().windows());
+        const int width = rows ? pixels.place.width : all;
         const auto stride = static_cast<std::ptrdiff_t>(sizeof(float) * pixels.channels) * width;
         draw_edit({pixels.source, width, all / width, channels, stride},
                   {pixels.result, width, all / width, channels, stride}, pixels.premultiplied,

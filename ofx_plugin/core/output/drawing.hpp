@@ -42,9 +42,9 @@ struct Drawing {
     std::shared_ptr<const Recolourer> reader;
     /// From the picture's code values to the palette's; null where they are equal.
     std::shared_ptr<const ColourConversion> conversion;
-    /// For Output::kPalette: the slice's colours before and after the edit, and the bounds of the
-    /// whole picture, which has the strip at its bottom.
+    /// For Output::kPalette: the slice's colours before and after the edit.
     std::vector<Vec3> original, edited;
+    /// The bounds of the whole picture: windows of picks lie in it, and the strip at its bottom.
     Area picture{};
     /// From make_clean_up(); null: nothing is cleaned up.
     std::shared_ptr<const CleanUp> clean_up;
@@ -70,7 +70,7 @@ struct Pixels {
     std::size_t count;
     std::size_t channels;
     bool premultiplied;
-    RowPlace place{};  ///< for Drawing::clean_up only
+    RowPlace place{};  ///< for Drawing::clean_up and windows of picks only
 };
 
 /// What the picks that are drawn and cleaned up are of; null where there are none.
@@ -82,7 +82,7 @@ std::shared_ptr<CleanUp> make_clean_up(const Drawing& drawing, CleanUp::Format f
 /// `in` and `out` have the same size and channels, and may be the same without Drawing::clean_up.
 void draw_edit(const ConstImageView& in, const ImageView& out, bool premultiplied,
                const Drawing& drawing, const RowPlace& place);
-/// Draws all but the strip of Output::kPalette. A pixel's result depends on that pixel and
+/// Draws all but the strip of Output::kPalette. A pixel's result depends on that pixel, its place and
 /// Drawing::clean_up alone.
 void draw_pixels(const Pixels& pixels, const Drawing& drawing);
 /// Draws the strip into a row, pixels x1 to x2 of row y, if the strip covers that row.

@@ -147,8 +147,19 @@ std::vector<Moment> moments(const Edits& edits, double frame, bool hold) {
 FramePick frame_pick(const Moment& moment, const std::vector<Held>& holds, double frame) {
     FrameMatte matte = baked(*moment.pick, moment.first, moment.point);
     hold_back(matte, moment.point, holds);
+    std::optional<FrameWindow> window;
+    if (moment.pick->window) window.emplace(*moment.pick->window, frame);
     return {moment.colour, moment.pick->change_at(frame), moment.strength,
-            std::make_shared<const FrameMatte>(std::move(matte))};
+            std::make_shared<const FrameMatte>(std::move(matte)), window};
+}
+
+/// Without picks.
+FramePicks none_of(const Edits& edits) {
+    FramePicks picks;
+    picks.display = edits.display;
+    picks.width = edits.width;
+    picks.height = edits.height;
+    return picks;
 }
 
 std::vector<Held> held_at(const std::vector<Moment>& holds) {
@@ -162,9 +173,13 @@ std::vector<Held> held_at(const std::vector<Moment>& holds) {
 
 }  // namespace
 
+bool FramePicks::windows() const {
+    return std::any_of(picks.begin(), picks.end(),
+                       [](const FramePick& pick) { return pick.window.has_value(); });
+}
+
 FramePicks picks_at(const Edits& edits, double frame) {
-    FramePicks result;
-    result.display = edits.display;
+    FramePicks result = none_of(edits);
     const std::vector<Held> held = held_at(moments(edits, frame, true));
     if (!held.empty()) {
         FrameMatte left(MatteGrid::kSize, 1.0f);
@@ -181,8 +196,7 @@ FramePicks picks_at(const Edits& edits, double frame) {
 }
 
 FramePicks matte_at(const Edits& edits, const std::string& id, double frame) {
-    FramePicks result;
-    result.display = edits.display;
+    FramePicks result = none_of(edits);
     for (const bool hold : {false, true}) {
         for (const Moment& moment : moments(edits, frame, hold)) {
             if (moment.pick->id != id) continue;
@@ -303,6 +317,14 @@ std::shared_ptr<const FrameMatte> arranged(const std::shared_ptr<const FrameMatt
     return matte;
 }
 
+template <class T>
+typename PickPlan<T>::Window plan_of(const std::optional<FrameWindow>& window) {
+    constexpr T kFar = T(1e15);
+    if (!window) return {{-kFar, -kFar}, {kFar, kFar}, 1};
+    const auto& box = window->box;
+    return {{box[0], box[1]}, {box[2], box[3]}, static_cast<T>(1 / window->feather)};
+}
+
 }  // namespace
 
 template <class T>
@@ -331,6 +353,7 @@ PickMemory<T>::PickMemory(const FramePicks& picks, const std::vector<Vec3>& done
                 pick.strength * (pick.change[c] - (i < done.size() ? done[i][c] : 0.0)) / own);
         }
         for (std::size_t c = 0; c < 2; ++c) one.along[c] = static_cast<T>(picked.along[c]);
+        one.window = plan_of<T>(pick.window);
         one.plain = static_cast<T>(picked.plain);
         one.dark = static_cast<T>(picked.dark);
         one.bright = static_cast<T>(picked.bright);
@@ -367,7 +390,7 @@ double left_at(const FramePicks& picks, const Vec3& colour) {
 }
 
 Vec3 with_picks(const FramePicks& picks, const PickPlan<double>& plan, const Vec3& colour,
-                const Vec3& moved) {
+                const Vec3& moved, const Spot* spot) {
     const Vec3 shown = displayed(colour, picks.display.get()), point = pick_point(shown);
     const auto reaches = [&](const PickPlan<double>::Grid& grid) {
         bool inside = true;
@@ -381,7 +404,10 @@ Vec3 with_picks(const FramePicks& picks, const PickPlan<double>& plan, const Vec
     for (int k = 0; k < plan.count; ++k) {
         const PickPlan<double>::One& pick = plan.picks[k];
         if (!reaches(pick.matte)) continue;
-        const double matte = MatteGrid::at(pick.matte.values, point);
+        double matte = MatteGrid::at(pick.matte.values, point);
+        if (const auto& window = picks.picks[static_cast<std::size_t>(k)].window; spot && window) {
+            matte *= window->at(*spot);
+        }
         const PickedColour picked({pick.along[0], pick.along[1]}, pick.plain, pick.dark,
                                   pick.bright);
         double share = matte * picked.amount(shown);

@@ -3,11 +3,13 @@
 // m is the matte over colours at this frame: the learned grid with the pick's sliders, moved along
 // with the picked colour, and what holds leave of it. a is the amount of the picked colour in c: 1
 // at it, s in a shade of it s times as dark, alpha in its mixture of alpha with grey, 0 in grey. So
-// shadows, highlights, soft edges and noise change as much as they should.
+// shadows, highlights, soft edges and noise change as much as they should. Far from a pick's window
+// its m is less.
 #pragma once
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "model/edits.hpp"
@@ -25,6 +27,7 @@ struct FramePick {
     Vec3 change;      ///< the whole change of that colour from the unedited one
     double strength;  ///< how much of the change is asked for, above 0
     std::shared_ptr<const FrameMatte> matte;
+    std::optional<FrameWindow> window{};  ///< none: the whole picture
 };
 
 struct FramePicks {
@@ -32,6 +35,10 @@ struct FramePicks {
     /// What holds leave of the changes that the palette makes; null: all.
     std::shared_ptr<const FrameMatte> left;
     std::shared_ptr<const DisplayCurve> display;
+    double width = 1, height = 1;  ///< of the clip, in pixels
+
+    /// Whether a pick has one.
+    bool windows() const;
 };
 
 /// The enabled picks and holds that ask for something at a frame.
@@ -82,8 +89,8 @@ extern template class PickMemory<double>;
 /// What holds leave of the palette's change of a colour, 0..1.
 double left_at(const FramePicks& picks, const Vec3& colour);
 /// The displacement of one colour, of which the palette does `moved`, in double. `plan` is that of
-/// the picks.
+/// the picks; windows count where its pixel's `spot` is given.
 Vec3 with_picks(const FramePicks& picks, const PickPlan<double>& plan, const Vec3& colour,
-                const Vec3& moved);
+                const Vec3& moved, const Spot* spot = nullptr);
 
 }  // namespace palette4d

@@ -18,6 +18,7 @@ struct Block {
     alignas(64) T colour[3][kSize];
     alignas(64) T seen[3][kSize];  ///< the colours as in a premultiplied picture, and their alpha
     alignas(64) T alpha[kSize];
+    alignas(64) T place[2][kSize];  ///< for windows of picks: x and y, in pixels of the clip
     /// Result: the displacement at strength 1, or what is seen then.
     alignas(64) T moved[3][kSize];
     alignas(64) T verdict[kSize];  ///< result, see Kernels

@@ -202,12 +202,29 @@ PALETTE4D_INLINE int reach(const typename PickPlan<T>::Grid& grid, Channels<cons
     return found;
 }
 
+/// What a window leaves of a pick at the places from `at` on, as FrameWindow::at() has it.
+template <class T>
+PALETTE4D_INLINE Lanes<T> window_at(const typename PickPlan<T>::Window& window,
+                                    Channels<const T> place, int at) {
+    const Lanes<T> zero = all(T(0));
+    Lanes<T> away = zero;
+    for (int c = 0; c < 2; ++c) {
+        const Lanes<T> x = load(place[c] + at);
+        const Lanes<T> beyond =
+            max(max(all(window.low[c]) - x, x - all(window.high[c])), zero) * all(window.scale);
+        away = away + beyond * beyond;
+    }
+    const Lanes<T> left = all(T(1)) - min(away, all(T(1)));
+    return left * left;
+}
+
 /// Adds to `sum` what a pick does to the colours from `at` on. Where several picks share a colour,
 /// its sum is weighted, and `weights` has the sum of the weights. `shares`, if it is not null, gets
 /// the share.
 template <bool alone, class T>
-PALETTE4D_INLINE void add_pick(const typename PickPlan<T>::One& pick, const Read<T>& read, int at,
-                               Channels<T> sum, T* shares, T* weights) {
+PALETTE4D_INLINE void add_pick(const typename PickPlan<T>::One& pick, const Read<T>& read,
+                               Channels<const T> place, int at, Channels<T> sum, T* shares,
+                               T* weights) {
     const Lanes<T> one = all(T(1)), least = all(static_cast<T>(palette4d::kLeastLight));
     const Lanes<T> hue = max(all(pick.along[0]) * load(read.chroma[0] + at) +
                                  all(pick.along[1]) * load(read.chroma[1] + at),
@@ -218,7 +235,8 @@ PALETTE4D_INLINE void add_pick(const typename PickPlan<T>::One& pick, const Read
         min((grey + least) * all(pick.dark), min((one - grey + least) * all(pick.bright), one));
     Lanes<T> amount = hue + all(pick.plain) * light;
     amount = select(amount > one, all(T(2)) - one / amount, amount);
-    const Lanes<T> matte = value_at<T>(pick.matte, read, at, T(0));
+    Lanes<T> matte = value_at<T>(pick.matte, read, at, T(0));
+    if (place) matte = matte * window_at<T>(pick.window, place, at);
     Lanes<T> share = matte * amount;
     if (!alone) {
         const Lanes<T> u = load(read.point[0] + at) - all(pick.at[0]),
@@ -247,15 +265,16 @@ PALETTE4D_INLINE void clear(Channels<T> rows, int row_count, int count) {
 /// Adds what the picks do to `moved`, and with `shares` their share to its fourth row. False when
 /// they do nothing.
 template <bool shares, class T>
-PALETTE4D_INLINE bool add_picks(const PickPlan<T>& plan, Channels<const T> shown, int count,
-                                Read<T>& read, Channels<T> moved) {
+PALETTE4D_INLINE bool add_picks(const PickPlan<T>& plan, Channels<const T> shown,
+                                Channels<const T> place, int count, Read<T>& read,
+                                Channels<T> moved) {
     constexpr int n = Lanes<T>::kCount;
     int reached[kSize];
     if (plan.count == 1) {
         const int found = reach<T>(plan.picks[0].matte, shown, count, read, reached);
         for (int i = 0; i < found; ++i) {
-            add_pick<true, T>(plan.picks[0], read, reached[i], moved, shares ? moved[3] : nullptr,
-                              nullptr);
+            add_pick<true, T>(plan.picks[0], read, place, reached[i], moved,
+                              shares ? moved[3] : nullptr, nullptr);
         }
         return found > 0;
     }
@@ -266,7 +285,7 @@ PALETTE4D_INLINE bool add_picks(const PickPlan<T>& plan, Channels<const T> shown
         const typename PickPlan<T>::One& pick = plan.picks[k];
         const int found = reach<T>(pick.matte, shown, count, read, reached);
         for (int i = 0; i < found; ++i) {
-            add_pick<false, T>(pick, read, reached[i], sum, shares ? sum[3] : nullptr, sum[4]);
+            add_pick<false, T>(pick, read, place, reached[i], sum, shares ? sum[3] : nullptr, sum[4]);
         }
         some |= found > 0;
     }
@@ -293,7 +312,8 @@ PALETTE4D_INLINE Channels<const T> read_colours(const PickPlan<T>& plan, Channel
 }
 
 template <class T>
-void add(const PickPlan<T>& plan, Channels<const T> colour, Channels<T> moved, int count) {
+void add(const PickPlan<T>& plan, Channels<const T> colour, Channels<const T> place,
+         Channels<T> moved, int count) {
     Read<T> read;
     Channels<const T> shown = read_colours<T>(plan, colour, count, read);
     if (plan.left.values) {
@@ -306,16 +326,16 @@ void add(const PickPlan<T>& plan, Channels<const T> colour, Channels<T> moved, i
             }
         }
     }
-    add_picks<false, T>(plan, shown, count, read, moved);
+    add_picks<false, T>(plan, shown, place, count, read, moved);
 }
 
-bool set(const PickPlan<float>& plan, Channels<const float> colour, Channels<float> moved,
-         int count) {
+bool set(const PickPlan<float>& plan, Channels<const float> colour, Channels<const float> place,
+         Channels<float> moved, int count) {
     Read<float> read;
     Channels<const float> shown = read_colours<float>(plan, colour, count, read);
     const Lanes<float> zero = all(0.0f);
     clear<float>(moved, 4, count);
-    const bool some = add_picks<true, float>(plan, shown, count, read, moved);
+    const bool some = add_picks<true, float>(plan, shown, place, count, read, moved);
     for (int at = 0; some && at < count; at += Lanes<float>::kCount) {
         // NaN where a channel is not finite: 0 times infinity is NaN.
         const Lanes<float> finite =

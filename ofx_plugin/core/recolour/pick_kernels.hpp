@@ -19,8 +19,14 @@ struct PickPlan {
         T step[3], base;      ///< node (u, v, l) is at step . (u, v, l) - base
         int plane;            ///< step[0]
     };
+    /// The part of the picture that a pick changes; far away in all directions where it is all.
+    struct Window {
+        T low[2], high[2];  ///< of a box, in pixels of the clip
+        T scale;            ///< 1 / the feather
+    };
     struct One {
         Grid matte;
+        Window window;
         T at[3];         ///< the picked colour's point
         T along[2];      ///< the amount of its chroma in a colour is along . chroma
         T plain;         ///< the part of the amount that is read from lightness, 0..1
@@ -48,16 +54,17 @@ struct PickKernels {
     using Channels = T (*)[kSize];
 
     /// Sets `moved`, which has what the palette does to `colour` at strength 1, to what holds leave
-    /// of it and what picks add.
+    /// of it and what picks add. `place` has where the pixels are, x and y in pixels of the clip;
+    /// null: windows do not count.
     void (*add_single)(const PickPlan<float>& plan, Channels<const float> colour,
-                       Channels<float> moved, int count);
+                       Channels<const float> place, Channels<float> moved, int count);
     void (*add_twofold)(const PickPlan<double>& plan, Channels<const double> colour,
-                        Channels<double> moved, int count);
+                        Channels<const double> place, Channels<double> moved, int count);
     /// Sets `moved` to what picks do; NaN and infinity do not move. Its fourth row is the share of
     /// their changes that is done: a matte times an amount, the mean where several picks share a
     /// colour. False when no colour moves.
-    bool (*set)(const PickPlan<float>& plan, Channels<const float> colour, Channels<float> moved,
-                int count);
+    bool (*set)(const PickPlan<float>& plan, Channels<const float> colour,
+                Channels<const float> place, Channels<float> moved, int count);
 
     /// One for each instruction set in this build.
     static const PickKernels& baseline();

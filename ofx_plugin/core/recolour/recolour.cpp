@@ -63,12 +63,12 @@ Vec3 Recolourer::palette_displacement(const Vec3& p, std::vector<double>& weight
     return sum;
 }
 
-Vec3 Recolourer::displaced(const Vec3& p, double strength) const {
+Vec3 Recolourer::displaced(const Vec3& p, double strength, const Spot* spot) const {
     if (!moves() || strength == 0 || !finite(p)) return p;
     std::vector<double> weights(body_.rgb().size());
     PaletteBody::Workspace workspace;
     const Vec3 moved = with_picks(picks_, plan_->twofold.picks.plan(), p,
-                                  palette_displacement(p, weights, workspace));
+                                  palette_displacement(p, weights, workspace), spot);
     Vec3 result = p;
     for (std::size_t c = 0; c < 3; ++c) {
         const double step = strength * moved[c];

@@ -30,7 +30,7 @@ public:
     bool palette_moves() const { return !displaced_.empty(); }
     const FramePicks& picks() const { return picks_; }
     /// `in` and `out` have the same size and channels, and may be the same memory. A pixel's result
-    /// depends on that pixel and the options only, not on threads, position or processor. Colours
+    /// depends on that pixel, its place and the options only, not on threads or processor. Colours
     /// with NaN or infinity pass; so do premultiplied ones whose alpha is 0 or not finite. Throws
     /// std::invalid_argument for mismatched views or instructions that this processor lacks.
     RecolourCounts apply(const ConstImageView& in, const ImageView& out,
@@ -44,7 +44,8 @@ public:
     const std::vector<Vec3>& displacement() const { return displacement_; }
     const RecolourPlan& plan() const { return *plan_; }
     /// One colour, in double precision. A colour with NaN or infinity is returned unchanged.
-    Vec3 displaced(const Vec3& p, double strength) const;
+    /// Windows count where its pixel's spot is given.
+    Vec3 displaced(const Vec3& p, double strength, const Spot* spot = nullptr) const;
 
 private:
     friend class DoubleWorker;

@@ -33,7 +33,7 @@ public:
         before_.reserve(3 * kPiece);
     }
 
-    void row(const float* from, float* to, int width) override {
+    void row(const float* from, float* to, int width, const Spot* spots) override {
         for (int x = 0; x < width; ++x, from += channels_, to += channels_) {
             const bool good = recolourable(from, premultiplied_);
             const double alpha = premultiplied_ ? from[3] : 1.0;
@@ -45,6 +45,7 @@ public:
             for (std::size_t c = 0; c < 3; ++c) rounded[c] = static_cast<float>(exact[c]);
             if (!std::isfinite(rounded[0] + rounded[1] + rounded[2])) continue;
             pixels_.push_back({exact, alpha, to});
+            if (spots) spots_.push_back(spots[x]);
             before_.insert(before_.end(), rounded, rounded + 3);
             if (pixels_.size() == kPiece) finish();
         }
@@ -53,7 +54,8 @@ public:
     void finish() override {
         if (pixels_.empty()) return;
         after_.resize(before_.size());
-        worker_->row(before_.data(), after_.data(), static_cast<int>(pixels_.size()));
+        worker_->row(before_.data(), after_.data(), static_cast<int>(pixels_.size()),
+                     spots_.empty() ? nullptr : spots_.data());
         worker_->finish();
         for (std::size_t i = 0; i < pixels_.size(); ++i) {
             Vec3 at = pixels_[i].exact;
@@ -69,6 +71,7 @@ public:
         }
         pixels_.clear();
         before_.clear();
+        spots_.clear();
     }
 
     RecolourCounts counts() const override { return worker_->counts(); }
@@ -97,6 +100,7 @@ private:
     std::unique_ptr<RowWorker> worker_;
     std::vector<Pixel> pixels_;
     std::vector<float> before_, after_;
+    std::vector<Spot> spots_;
 };
 
 }  // namespace
@@ -139,7 +143,14 @@ RecolourCounts Recolourer::apply(const ConstImageView& in, const ImageView& out,
         const std::unique_ptr<RowWorker> rows =
             converts ? std::make_unique<ConvertedRows>(*this, options, in.channels)
                      : worker(options, in.channels);
-        for (int y = next(); y >= 0; y = next()) rows->row(in.row(y), out.row(y), in.width);
+        std::vector<Spot> spots(
+            options.place && picks().windows() ? static_cast<std::size_t>(in.width) : 0);
+        for (int y = next(); y >= 0; y = next()) {
+            for (std::size_t x = 0; x < spots.size(); ++x) {
+                spots[x] = options.place->at(static_cast<int>(x), y);
+            }
+            rows->row(in.row(y), out.row(y), in.width, spots.empty() ? nullptr : spots.data());
+        }
         rows->finish();
         const std::lock_guard<std::mutex> lock(guard);
         counts += rows->counts();

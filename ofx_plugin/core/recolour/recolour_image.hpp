@@ -3,9 +3,11 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 
 #include "convert/colour_conversion.hpp"
 #include "model/alpha.hpp"
+#include "model/picks.hpp"
 #include "simd/instruction_set.hpp"
 
 namespace palette4d {
@@ -28,6 +30,16 @@ using ImageView = ImageOf<float, char>;
 
 void copy_rows(const ConstImageView& in, const ImageView& out);
 
+/// Where an image's pixels are in the clip's picture, which windows of picks need: the middle of
+/// the first pixel, and the steps to the next one and to the next row, in pixels of the clip.
+struct ImagePlace {
+    double x, y, across, down;
+
+    Spot at(int column, int row) const {
+        return {static_cast<float>(x + across * column), static_cast<float>(y + down * row)};
+    }
+};
+
 /// How exactly a colour's displacement is computed.
 enum class Precision {
     /// Many colours at a time, in float where the error estimate allows it, else in double.
@@ -49,6 +61,7 @@ struct RecolourOptions {
     /// From the image's code values to the palette's; null where they are the same. Colours that
     /// the edit does not move keep their bits; others are converted in double.
     const ColourConversion* conversion = nullptr;
+    std::optional<ImagePlace> place{};  ///< none: windows of picks do not count
 };
 
 /// How many colours of an apply() each method computed; copied colours are not counted.
@@ -70,8 +83,8 @@ class RowWorker {
 public:
     virtual ~RowWorker() = default;
     /// Adjacent pixels. `from` and `to` must stay valid until finish() returns; only then is all of
-    /// it written.
-    virtual void row(const float* from, float* to, int width) = 0;
+    /// it written. `spots` has where each pixel is; null: windows do not count.
+    virtual void row(const float* from, float* to, int width, const Spot* spots) = 0;
     virtual void finish() = 0;
     virtual RecolourCounts counts() const = 0;
 };

@@ -30,17 +30,17 @@ std::size_t slot(const Vec3& p) {
 
 /// Precision::kDouble, colour by colour. Caches some displacements, since colours repeat in flat
 /// areas and in 8-bit images. They depend on the colour alone, so the cache does not change
-/// results.
+/// results; where a window makes picks depend on the place, it has what the palette does.
 class DoubleWorker final : public RowWorker {
 public:
     /// `recolourer` must outlive this and move some colour.
     DoubleWorker(const Recolourer& recolourer, const RecolourOptions& options, int channels);
 
-    void row(const float* from, float* to, int width) override;
+    void row(const float* from, float* to, int width, const Spot* spots) override;
     void finish() override {}
     RecolourCounts counts() const override { return {0, 0, count_}; }
     /// Recolours one pixel that is recolourable().
-    void recolour(const float* from, float* to);
+    void recolour(const float* from, float* to, const Spot* spot);
 
 private:
     struct Entry {
@@ -48,7 +48,7 @@ private:
         bool known;
     };
 
-    const Vec3& displacement(const Vec3& p);
+    Vec3 displacement(const Vec3& p, const Spot* spot);
 
     const Recolourer& recolourer_;
     const double strength_;
@@ -72,21 +72,21 @@ DoubleWorker::DoubleWorker(const Recolourer& recolourer, const RecolourOptions& 
       plan_(recolourer.plan().twofold.picks.plan()),
       weights_(recolourer.original().size()) {}
 
-void DoubleWorker::row(const float* from, float* to, int width) {
+void DoubleWorker::row(const float* from, float* to, int width, const Spot* spots) {
     for (int x = 0; x < width; ++x, from += channels_, to += channels_) {
         if (channels_ == 4) to[3] = from[3];
         if (recolourable(from, divide_)) {
-            recolour(from, to);
+            recolour(from, to, spots ? spots + x : nullptr);
         } else {
             for (int c = 0; c < 3; ++c) to[c] = from[c];
         }
     }
 }
 
-void DoubleWorker::recolour(const float* from, float* to) {
+void DoubleWorker::recolour(const float* from, float* to, const Spot* spot) {
     ++count_;
     const double alpha = divide_ ? from[3] : 1.0;
-    const Vec3& moved = displacement(straight_colour(from, divide_));
+    const Vec3 moved = displacement(straight_colour(from, divide_), spot);
     for (std::size_t c = 0; c < 3; ++c) {
         // Equals multiplying the displaced colour by alpha, with less rounding.
         const double step = alpha * (strength_ * moved[c]);
@@ -95,14 +95,15 @@ void DoubleWorker::recolour(const float* from, float* to) {
     }
 }
 
-const Vec3& DoubleWorker::displacement(const Vec3& p) {
+Vec3 DoubleWorker::displacement(const Vec3& p, const Spot* spot) {
     if (memory_.empty()) memory_.assign(kSlots, Entry{{0, 0, 0}, {0, 0, 0}, false});
     Entry& entry = memory_[slot(p)];
     if (!entry.known || entry.colour != p) {
         Vec3 moved = recolourer_.palette_displacement(p, weights_, workspace_);
-        if (picks_) moved = with_picks(recolourer_.picks_, plan_, p, moved);
+        if (picks_ && !spot) moved = with_picks(recolourer_.picks_, plan_, p, moved);
         entry = {p, moved, true};
     }
+    if (spot) return with_picks(recolourer_.picks_, plan_, p, entry.displacement, spot);
     return entry.displacement;
 }
 
@@ -130,12 +131,12 @@ public:
           single_(recolourer.plan().single, kernels_.single,
                   kernels_of<PickKernels>(options.instructions).add_single, options, twofold_) {}
 
-    void row(const float* from, float* to, int width) override {
+    void row(const float* from, float* to, int width, const Spot* spots) override {
         constexpr int kSize = Block<float>::kSize;
         for (int x = 0; x < width; x += kSize) {
             const int count = std::min(kSize, width - x);
             const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(x) * channels_;
-            single_.run(kernels_, from + at, to + at, channels_, count);
+            single_.run(kernels_, from + at, to + at, channels_, count, spots ? spots + x : nullptr);
         }
     }
 
@@ -152,7 +153,7 @@ private:
     template <class T, class Next>
     class Stage {
         using AddPicks = void (*)(const PickPlan<T>&, PickKernels::Channels<const T>,
-                                  PickKernels::Channels<T>, int);
+                                  PickKernels::Channels<const T>, PickKernels::Channels<T>, int);
 
     public:
         Stage(const PlanOf<T>& plan, const Kernels<T>& kernels, AddPicks add_picks,
@@ -179,8 +180,11 @@ private:
         }
 
         /// Up to Block::kSize adjacent pixels.
-        void run(const MvcKernels& kernels, const float* in, float* out, int channels, int count) {
+        void run(const MvcKernels& kernels, const float* in, float* out, int channels, int count,
+                 const Spot* spots) {
             Batch& batch = incoming_;
+            placed_ = spots != nullptr;
+            for (int i = 0; placed_ && i < count; ++i) batch.put(i, spots[i]);
             const bool good = kernels.read(in, channels, count, divide_, batch.block);
             if (displace(batch.block, count) && good) {
                 kernels.write(batch.block, channels, count, out);
@@ -198,9 +202,11 @@ private:
         }
 
         /// Recolours one pixel that is recolourable(); `to` may be `from`.
-        void recolour(const float* from, float* to) {
+        void recolour(const float* from, float* to, const Spot* spot) {
             Batch& batch = incoming_;
             const int at = batch.count++;
+            placed_ = spot != nullptr;
+            if (spot) batch.put(at, *spot);
             batch.from[at] = from;
             batch.to[at] = to;
             for (int c = 0; c < 3; ++c) batch.block.colour[c][at] = from[c];
@@ -225,6 +231,15 @@ private:
             const float* from[kSize];
             float* to[kSize];
             int count = 0;
+
+            void put(int at, const Spot& spot) {
+                block.place[0][at] = static_cast<T>(spot.x);
+                block.place[1][at] = static_cast<T>(spot.y);
+            }
+            Spot spot(int at) const {
+                return {static_cast<float>(block.place[0][at]),
+                        static_cast<float>(block.place[1][at])};
+            }
 
             void divide(int at, float by) {
                 block.alpha[at] = by;
@@ -253,7 +268,8 @@ private:
         /// kLargestPicked.
         void finish(Block<T>& block, int count, bool small) {
             if (add_picks_) {
-                add_picks_(picks_, block.colour, block.moved, count);
+                add_picks_(picks_, block.colour, placed_ ? block.place : nullptr, block.moved,
+                           count);
                 if (sizeof(T) == sizeof(float) && !small) leave_large(block, count);
             }
             kernels_.move(block, count, strength_, divide_);
@@ -293,12 +309,14 @@ private:
                     outside_.block.seen[c][at] = batch.block.seen[c][i];
                 }
                 outside_.block.alpha[at] = batch.block.alpha[i];
+                if (placed_) outside_.put(at, batch.spot(i));
                 if (outside_.count == kSize) flush();
             } else if (verdict > 0) {
                 for (int c = 0; c < 3; ++c) to[c] = static_cast<float>(batch.block.moved[c][i]);
                 ++count_;
             } else {
-                next_.recolour(from, to);
+                const Spot spot = placed_ ? batch.spot(i) : Spot{};
+                next_.recolour(from, to, placed_ ? &spot : nullptr);
             }
         }
 
@@ -321,6 +339,7 @@ private:
         const bool divide_;
         const T tolerance_;
         bool usable_;
+        bool placed_ = false;  ///< the batches have places; the same for all pixels of a worker
         T shell_ = 0;
         Next& next_;
         Scratch<T> scratch_;

@@ -174,7 +174,7 @@ class _View:
         corner, faces = np.zeros((1, 3)), np.zeros((0, 3), np.int32)
         matte = self.grade.core.pick_matte_at(pick.id, self.frame)
         drawing = _core.Recolourer(corner, corner, faces, picks=matte)
-        drawn = drawing.apply(self.rgb, precision="single")
+        drawn = drawing.apply(self.rgb, precision="single", picture=True)
         share = np.where(self.real, (drawn - self.rgb)[..., 0], 0)
         return np.clip(share, 0, 1).astype(np.float32)
 

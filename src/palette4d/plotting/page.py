@@ -104,7 +104,7 @@ def column(
         colours = _core.edited_colours(sidecar.polytope, edits, palette)
         picks = edits.picks_at(palette.frame)
         recolourer = _core.Recolourer(palette.rgb, colours, palette.faces, picks=picks)
-        return recolourer.apply(small, threads=0)
+        return recolourer.apply(small, threads=0, picture=True)
 
     if sidecar.edits.empty and against is None:
         return Column(frame, shape, ids, (small,))

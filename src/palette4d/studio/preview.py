@@ -74,10 +74,20 @@ class Grade:
         """Return the grade that "after" shows: that of a version, or the document's ("")."""
         return cls.of_version(document, version, frame) or cls.of(document, frame)
 
+    def of_part(self, region: Region) -> "Grade":
+        """Return the grade of a part of the picture: windows of picks lie elsewhere in it."""
+        return dataclasses.replace(self, picks=_of_part(self.picks, region))
+
     def recolourer(self) -> _core.Recolourer:
         """Return the exact recolouring."""
         palette = self.palette
         return _core.Recolourer(palette.rgb, palette.edited, palette.faces, picks=self.picks)
+
+
+def _of_part(picks: _core.FramePicks | None, region: Region) -> _core.FramePicks | None:
+    if picks is None or not any(picks.windows):
+        return picks
+    return picks.of_part(region.part)
 
 
 @dataclass(frozen=True)
@@ -313,7 +323,8 @@ class Preview:
         matte = None
         if request.matte is not None and request.grade is not None and after is not None:
             source = self._source(request, exact)
-            matte = matte_of(source, request.grade, request.matte, request.pick_matte)
+            picks = _of_part(request.pick_matte, request.region)
+            matte = matte_of(source, request.grade, request.matte, picks)
             if matte is not None:
                 shown = _highlighted if request.pick_matte is None else _singled_out
                 after = shown(after, matte)
@@ -376,7 +387,7 @@ class Preview:
         if exact and not request.region.whole:
             whole = self.exact(request.pixels, grade, request.premultiplied, check)
             return resampled(whole, request.region)
-        source = self._source(request, exact)
+        source, grade = self._source(request, exact), grade.of_part(request.region)
         dragged = not (exact or request.settled or request.scaled)
         if dragged and grade.conversion is None and source.shape[2] == 3:
             return self._responses.picture(source, grade)
@@ -467,7 +478,7 @@ def matte_of(
     if grade.conversion is not None:
         own = grade.conversion.to_palette(own).astype(np.float32)
     recolourer = _core.Recolourer(palette.rgb, moved, palette.faces, picks=picks)
-    done = recolourer.apply(own, precision="single", threads=0)
+    done = recolourer.apply(own, precision="single", threads=0, picture=True)
     matte: F32 = np.clip(np.nan_to_num(done[..., 0] - own[..., 0]), 0, 1)
     return matte if picks is None or matte.any() else None
 

@@ -31,7 +31,6 @@ class Moves:
         palette, picks = grade.palette, grade.picks
         self._grade = grade
         self._picks = [] if picks is None else picks.picks
-        self._left = None if picks is None else picks.left
         moved = np.asarray(palette.edited) - palette.rgb
         changes = np.array([change for _, change, _, _ in self._picks]).reshape(-1, 3)
         #: (n, 3) displacements of the palette's colours, and changes of the picks
@@ -39,13 +38,20 @@ class Moves:
 
     def weighs_as(self, other: "Moves") -> bool:
         """Return whether the weights are those of other moves."""
-        return all(map(np.array_equal, self._fixed(), other._fixed())) and (
+        return (
             len(self._picks) == len(other._picks)
+            and all(map(np.array_equal, self._fixed(), other._fixed()))
+            and self._windows() == other._windows()
         )
+
+    def _windows(self) -> list[Any]:
+        """Return where in the picture the picks are."""
+        return [] if self._grade.picks is None else self._grade.picks.windows
 
     def _fixed(self) -> list[Any]:
         """Return what decides the weights."""
-        palette, left = self._grade.palette, self._left
+        palette, picks = self._grade.palette, self._grade.picks
+        left = None if picks is None else picks.left
         fixed = [palette.rgb, palette.faces, np.zeros(0) if left is None else left]
         for colour, _, strength, matte in self._picks:
             fixed += [colour, strength, matte]
@@ -53,13 +59,9 @@ class Moves:
 
     def drawn(self, source: F32, by: F64) -> F32:
         """Return (h, w, 3) pixels with other displacements and changes."""
-        palette, picks, count = self._grade.palette, None, len(self._grade.palette.rgb)
-        if self._picks:
-            changed = zip(self._picks, by[count:].tolist(), strict=True)
-            own = [(colour, change, part, matte) for (colour, _, part, matte), change in changed]
-            picks = _core.FramePicks(own, left=self._left, display=self._grade.curve)
-        elif self._grade.picks is not None:
-            picks = self._grade.picks  # holds alone
+        palette, picks, count = self._grade.palette, self._grade.picks, len(self._grade.palette.rgb)
+        if picks is not None:
+            picks = picks.with_changes(by[count:].tolist())
         moved = np.asarray(palette.rgb) + by[:count]
         recolourer = _core.Recolourer(palette.rgb, moved, palette.faces, picks=picks)
         if picks is not None and picks.count:
