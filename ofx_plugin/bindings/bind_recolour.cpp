@@ -47,8 +47,7 @@ InstructionSet instructions_from(const std::string& name) {
 
 py::array apply(const Recolourer& self, const py::array& image, double strength, bool premultiplied,
                 int threads, const py::object& out, const std::string& precision,
-                const std::string& instructions, const ColourConversion* conversion,
-                bool picture) {
+                const std::string& instructions, const ColourConversion* conversion, bool picture) {
     require_image(image, "image");
     py::array result;
     if (out.is_none()) {

@@ -82,7 +82,10 @@ struct Both : Ready {
             EXPECT(std::memcmp(&a[i], &from[i], 4 * sizeof(float)) != 0,
                    "an untouched pixel changed");
             for (std::size_t c = i; c < i + 4 && !converts; ++c) {
-                EXPECT(std::memcmp(&a[c], &b[c], sizeof(float)) == 0 ||
+                // At a window's edge steps are so small that some round to none here, and to one
+                // unit in the last place there.
+                const bool rounded = std::nextafter(from[c], b[c]) == b[c] && from[c] != 0;
+                EXPECT(std::memcmp(&a[c], &b[c], sizeof(float)) == 0 || rounded ||
                            std::memcmp(&a[c], &from[c], sizeof(float)) != 0,
                        "an untouched number changed");
             }

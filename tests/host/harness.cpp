@@ -114,7 +114,9 @@ std::string text_with_picks(bool edited) {
         "to": [0.25, 0.5, 0.75]},
         {"id": "p3", "kind": "hold", "frame": 12, "rgb": [0.25, 0.75, 0.25]},
         {"id": "p4", "kind": "pick", "frame": 12, "rgb": [0.25, 0.25, 0.75],
-        "to": [0.75, 0.75, 0.25]}], )";
+        "to": [0.75, 0.75, 0.25], "window": {"feather": 20.37, "keys": [
+        {"frame": 10, "box": [8.13, 16.41, 16.2, 24.07]},
+        {"frame": 14, "box": [21.3, 12.6, 32.9, 68.7]}]}}], )";
     text.insert(text.find("\"edits\": {") + 10, picks);
     return text;
 }

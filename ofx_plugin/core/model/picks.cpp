@@ -41,8 +41,10 @@ FrameWindow::FrameWindow(const PickWindow& window, double frame)
 }
 
 double FrameWindow::at(const Spot& spot) const {
-    const double x = std::max({box[0] - spot.x, spot.x - box[2], 0.0f});
-    const double y = std::max({box[1] - spot.y, spot.y - box[3], 0.0f});
+    const auto beyond = [](double low, double at, double high) {
+        return std::max({low - at, at - high, 0.0});
+    };
+    const double x = beyond(box[0], spot.x, box[2]), y = beyond(box[1], spot.y, box[3]);
     const double left = 1 - std::min((x * x + y * y) / (feather * feather), 1.0);
     return left * left;
 }

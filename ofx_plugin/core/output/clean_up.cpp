@@ -99,7 +99,7 @@ int clean_up_support(int cell) { return (2 * kAround + 2) * cell; }
 struct CleanUp::Block {
     alignas(64) float colour[4][kInBlock];  ///< and alpha, where it divides
     alignas(64) float guide[3][kInBlock];
-    alignas(64) float place[2][kInBlock];  ///< for windows
+    alignas(64) float place[2][kInBlock];              ///< for windows
     alignas(64) float moved[kCleanUpMoved][kInBlock];  ///< what picks do, and their share
     alignas(
         64) float counts[kInBlock];  ///< 1 where there is a pixel that can be recoloured, else 0
@@ -154,8 +154,8 @@ bool CleanUp::load(const float* row, int row_x, int row_end, int x, int y, Block
         });
         for (int i = slots; i < kInBlock; ++i) block.place[0][i] = block.place[1][i] = 0;
     }
-    block.some = set_picks_(picks_, block.colour, windows_ ? block.place : nullptr, block.moved,
-                            kInBlock);
+    block.some =
+        set_picks_(picks_, block.colour, windows_ ? block.place : nullptr, block.moved, kInBlock);
     if (!block.some) {
         for (int c = 0; c < kCleanUpMoved; ++c) std::fill_n(block.moved[c], kInBlock, 0.0f);
         return false;

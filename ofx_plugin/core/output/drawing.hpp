@@ -82,8 +82,8 @@ std::shared_ptr<CleanUp> make_clean_up(const Drawing& drawing, CleanUp::Format f
 /// `in` and `out` have the same size and channels, and may be the same without Drawing::clean_up.
 void draw_edit(const ConstImageView& in, const ImageView& out, bool premultiplied,
                const Drawing& drawing, const RowPlace& place);
-/// Draws all but the strip of Output::kPalette. A pixel's result depends on that pixel, its place and
-/// Drawing::clean_up alone.
+/// Draws all but the strip of Output::kPalette. A pixel's result depends on that pixel, its place
+/// and Drawing::clean_up alone.
 void draw_pixels(const Pixels& pixels, const Drawing& drawing);
 /// Draws the strip into a row, pixels x1 to x2 of row y, if the strip covers that row.
 void draw_strip(float* row, int x1, int x2, int y, std::size_t channels, const Drawing& drawing);

@@ -285,7 +285,8 @@ PALETTE4D_INLINE bool add_picks(const PickPlan<T>& plan, Channels<const T> shown
         const typename PickPlan<T>::One& pick = plan.picks[k];
         const int found = reach<T>(pick.matte, shown, count, read, reached);
         for (int i = 0; i < found; ++i) {
-            add_pick<false, T>(pick, read, place, reached[i], sum, shares ? sum[3] : nullptr, sum[4]);
+            add_pick<false, T>(pick, read, place, reached[i], sum, shares ? sum[3] : nullptr,
+                               sum[4]);
         }
         some |= found > 0;
     }

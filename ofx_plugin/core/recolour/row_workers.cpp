@@ -136,7 +136,8 @@ public:
         for (int x = 0; x < width; x += kSize) {
             const int count = std::min(kSize, width - x);
             const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(x) * channels_;
-            single_.run(kernels_, from + at, to + at, channels_, count, spots ? spots + x : nullptr);
+            single_.run(kernels_, from + at, to + at, channels_, count,
+                        spots ? spots + x : nullptr);
         }
     }
 

@@ -68,9 +68,19 @@ Image everything(int width, int height, int channels, std::uint64_t seed) {
     return image;
 }
 
-/// Picks of every kind: several, one, with holds, pale ones, with a curve.
+/// A window that goes from the left to the right in 10 frames.
+PickWindow moving_window(double feather) {
+    return {feather, {{0, {10, 2, 60, 5}}, {10, {110, 2, 160, 5}}}};
+}
+
+/// Picks of every kind: several, one, with holds, pale ones, with a curve, with windows.
 std::vector<FramePicks> many() {
     std::vector<FramePicks> all;
+    Pick inside = pick("a", kRed, {0.3, 0.3, 0.6}), spot = pick("b", kGreen, {0.6, 0.5, 0.2});
+    inside.window = moving_window(20);
+    spot.window = moving_window(0);
+    all.push_back(picks_at(edits_of({inside}), 5));
+    all.push_back(picks_at(edits_of({inside, spot, pick("c", kBlue, {0.6, 0.3, 0.2})}), 2));
     all.push_back(picks_at(edits_of({pick("a", kRed, {0.3, 0.3, 0.6})}), 0));
     all.push_back(
         picks_at(edits_of({pick("a", kRed, {0.3, 0.3, 0.6}), pick("b", kGreen, {0.6, 0.5, 0.2}),
@@ -227,7 +237,8 @@ TEST(pictures_are_the_same_by_every_way) {
             if (!recolourer.moves()) continue;
             for (const int channels : {3, 4}) {
                 const Image image = everything(203, 7, channels, 5);
-                const RecolourOptions way{0.75, channels == 4, 1};
+                RecolourOptions way{0.75, channels == 4, 1};
+                way.place = ImagePlace{0.5, 0.5, 1, 1};
                 Image expected(203, 7, channels), exact(203, 7, channels);
                 recolourer.apply(image.in(), expected.out(), way);
                 RecolourOptions twofold = way;
@@ -257,6 +268,7 @@ TEST(pictures_are_the_same_by_every_way) {
                     const std::size_t at = (4 * 203 + static_cast<std::size_t>(x)) *
                                            static_cast<std::size_t>(channels);
                     float pixel[4];
+                    way.place = ImagePlace{x + 0.5, 4.5, 1, 1};
                     recolourer.apply({&image.data[at], 1, 1, channels, 16},
                                      {pixel, 1, 1, channels, 16}, way);
                     CHECK(std::memcmp(pixel, &expected.data[at], sizeof(float) * channels) == 0);
@@ -293,29 +305,37 @@ TEST(kernels_of_all_sets_agree_where_stages_need_them) {
         const PickMemory<float> single(all, {});
         alignas(64) double colour[3][64], expected[3][64], found[3][64];
         alignas(64) float colour_f[3][64], expected_f[4][64], found_f[4][64];
+        alignas(64) double place[2][64];
+        alignas(64) float place_f[2][64];
+        Spot spots[64];
         for (int i = 0; i < 64; ++i) {
             const Vec3 p = random.colour(-0.3, 1.3);
             for (std::size_t c = 0; c < 3; ++c) {
                 colour_f[c][i] = static_cast<float>(p[c]);
                 colour[c][i] = static_cast<double>(colour_f[c][i]);
             }
+            spots[i] = {static_cast<float>(random.uniform(-5, 210)),
+                        static_cast<float>(random.uniform(-5, 12))};
+            place[0][i] = static_cast<double>(place_f[0][i] = spots[i].x);
+            place[1][i] = static_cast<double>(place_f[1][i] = spots[i].y);
         }
         for (const int count : {1, 3, 17, 64}) {
             std::fill_n(&expected[0][0], 192, 0.25);
-            PickKernels::baseline().add_twofold(twofold.plan(), colour, expected, count);
+            PickKernels::baseline().add_twofold(twofold.plan(), colour, place, expected, count);
             for (int i = 0; i < count; ++i) {
                 const Vec3 p{colour[0][i], colour[1][i], colour[2][i]};
-                const Vec3 exact = with_picks(all, twofold.plan(), p, {0.25, 0.25, 0.25});
+                const Vec3 exact =
+                    with_picks(all, twofold.plan(), p, {0.25, 0.25, 0.25}, &spots[i]);
                 for (std::size_t c = 0; c < 3; ++c) CHECK_NEAR(expected[c][i], exact[c], 1e-12);
             }
             std::fill_n(&expected_f[0][0], 256, 1.0f);
-            PickKernels::baseline().set(single.plan(), colour_f, expected_f, count);
+            PickKernels::baseline().set(single.plan(), colour_f, place_f, expected_f, count);
             for (const InstructionSet set : instruction_sets()) {
                 const PickKernels& kernels = kernels_of<PickKernels>(set);
                 std::fill_n(&found[0][0], 192, 0.25);
-                kernels.add_twofold(twofold.plan(), colour, found, count);
+                kernels.add_twofold(twofold.plan(), colour, place, found, count);
                 std::fill_n(&found_f[0][0], 256, 1.0f);
-                const bool some = kernels.set(single.plan(), colour_f, found_f, count);
+                const bool some = kernels.set(single.plan(), colour_f, place_f, found_f, count);
                 for (std::size_t c = 0; c < 4; ++c) {
                     const std::size_t size = static_cast<std::size_t>(count);
                     if (c < 3) CHECK(std::memcmp(found[c], expected[c], size * 8) == 0);
@@ -323,6 +343,59 @@ TEST(kernels_of_all_sets_agree_where_stages_need_them) {
                     CHECK(some || std::count(found_f[c], found_f[c] + size, 0.0f) == count);
                 }
             }
+        }
+    }
+}
+
+TEST(a_pick_stays_in_its_window) {
+    Pick inside = pick("a", kRed, {0.3, 0.3, 0.6});
+    inside.window = moving_window(20);
+    const Edits edits = edits_of({inside});
+    const Recolourer all = with(picks_at(edits_of({pick("a", kRed, {0.3, 0.3, 0.6})}), 0));
+    const Vec3 whole = all.displaced(kRed, 1) - kRed;
+    CHECK_NEAR(whole[2], 0.4, 1e-6);
+    const auto share_at = [&](double frame, const Spot& spot) {
+        const Recolourer map = with(picks_at(edits, frame));
+        const Vec3 moved = map.displaced(kRed, 1, &spot) - kRed;
+        CHECK_NEAR(moved[0] * whole[2], moved[2] * whole[0], 1e-9);
+        return moved[2] / whole[2];
+    };
+    // The box, and half of the feather beyond its sides and its corner.
+    CHECK_NEAR(share_at(0, {30, 3}), 1, 1e-9);
+    CHECK_NEAR(share_at(0, {10, 5}), 1, 1e-9);
+    for (const Spot& spot : {Spot{0, 3}, Spot{70, 3}, Spot{30, 15}, Spot{66, 13}}) {
+        CHECK_NEAR(share_at(0, spot), 0.5625, 1e-6);
+    }
+    CHECK(share_at(0, {81, 3}) == 0 && share_at(0, {76, 19}) == 0);
+    // It moves with time, and stays where it was before and after.
+    CHECK(share_at(5, {30, 3}) == 0);
+    CHECK_NEAR(share_at(5, {60, 3}), 1, 1e-9);
+    CHECK_NEAR(share_at(5, {50, 3}), share_at(0, {0, 3}), 1e-6);
+    CHECK(share_at(-3, {30, 3}) == share_at(0, {30, 3}));
+    CHECK(share_at(99, {120, 3}) == share_at(10, {120, 3}));
+    // A colour alone has no place: LUTs have all of the pick.
+    CHECK(with(picks_at(edits, 0)).displaced(kRed, 1) == all.displaced(kRed, 1));
+}
+
+TEST(the_picture_may_have_another_size_than_the_clip) {
+    Pick inside = pick("a", kRed, {0.3, 0.3, 0.6});
+    inside.window = PickWindow{1, {{0, {100, 0, 200, 50}}}};
+    Edits edits = edits_of({inside});
+    edits.width = 200;
+    edits.height = 100;
+    const Recolourer map = with(picks_at(edits, 0));
+    Image proxy(20, 10, 3);
+    for (std::size_t i = 0; i < proxy.data.size(); ++i) {
+        proxy.data[i] = static_cast<float>(kRed[i % 3]);
+    }
+    Image found(20, 10, 3);
+    RecolourOptions way;
+    way.place = ImagePlace{5, 5, 10, 10};
+    map.apply(proxy.in(), found.out(), way);
+    for (int y = 0; y < 10; ++y) {
+        for (int x = 0; x < 20; ++x) {
+            const auto at = static_cast<std::size_t>(3 * (y * 20 + x));
+            CHECK((found.data[at] != proxy.data[at]) == (x >= 10 && y < 5));
         }
     }
 }

@@ -127,7 +127,9 @@ std::string version_2() {
         "{\"id\": \"p1\", \"kind\": \"pick\", \"frame\": 3, \"rgb\": [0.4, 0.3, 0.25],"
         " \"to\": [0.5, 0.2, 0.2], \"pixel\": [10, 7], \"box\": 3, \"matte\": \"m2\","
         " \"areas\": [{\"frame\": 3, \"points\": [[1, 2], [3, 4.5]], \"radius\": 2}],"
-        " \"whole_hue\": false, \"reach\": -1.5, \"softness\": 0.25, \"lightness\": [0.125, 0.75]},"
+        " \"whole_hue\": false, \"reach\": -1.5, \"softness\": 0.25, \"lightness\": [0.125, 0.75],"
+        " \"window\": {\"feather\": 20, \"keys\": [{\"frame\": 3, \"box\": [-5, 0, 10, 7.5], "
+        "\"given\": true}, {\"frame\": 5, \"box\": [5, 2, 30, 11.5]}]}},"
         "{\"id\": \"p2\", \"kind\": \"hold\", \"frame\": 0, \"rgb\": [0.4, 0.3, 0.25]}]");
 }
 
@@ -144,6 +146,10 @@ TEST(version_2_has_mattes) {
           pick.taken().odds.back() == 3);
     CHECK(pick.reach == -1.5 && pick.softness == 0.25);
     CHECK(pick.darkest == 0.125 && pick.lightest == 0.75);
+    CHECK(pick.window && !hold.window && pick.window->feather == 20);
+    CHECK(pick.window->box_at(4) == (PickWindow::Box{0, 1, 20, 9.5}));
+    CHECK(edits.width == static_cast<double>(sidecar.clip.width) &&
+          edits.height == static_cast<double>(sidecar.clip.height));
     CHECK(!hold.matte &&
           hold.taken().odds == hue_matte(displayed(hold.rgb, edits.display.get())).odds);
     const std::string other = replaced(version_2(), "\"matte\": \"m2\"", "\"matte\": \"m1\"");
@@ -193,6 +199,17 @@ TEST(broken_mattes_and_picks_are_refused_where_they_are_broken) {
         {"\"matte\": \"m2\"", "\"matte\": \"m3\"", "/edits/picks/0/matte"},
         {"[0.125, 0.75]", "[0.75, 0.75]", "/edits/picks/0/lightness"},
         {"\"box\": 3", "\"spread\": []", "/edits/picks/0/spread"},  // of version 1
+        {"[-5, 0, 10, 7.5]", "[-5, 0, -5, 7.5]", "/edits/picks/0/window/keys/0/box"},
+        {"[-5, 0, 10, 7.5]", "[-5, 8, 10, 7.5]", "/edits/picks/0/window/keys/0/box"},
+        {"[-5, 0, 10, 7.5]", "[-5, 0, 10]", "/edits/picks/0/window/keys/0/box"},
+        {"[-5, 0, 10, 7.5]", "[-5, 0, 1e7, 7.5]", "/edits/picks/0/window/keys/0/box/2"},
+        {"{\"frame\": 5, \"box\"", "{\"frame\": 3, \"box\"", "/edits/picks/0/window/keys/1/frame"},
+        {"\"feather\": 20", "\"feather\": -1", "/edits/picks/0/window/feather"},
+        {"\"feather\": 20, ", "", "/edits/picks/0/window/feather"},
+        {"\"kind\": \"hold\"",
+         "\"window\": {\"feather\": 1, \"keys\": [{\"frame\": 1, \"box\": [0, 0, 1, 1]}]}, "
+         "\"kind\": \"hold\"",
+         "/edits/picks/1/window"},
         {"\"picks\": [", "\"solution\": {}, \"picks\": [", "/edits/solution"},
     };
     for (const Case& broken : cases) {
