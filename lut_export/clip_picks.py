@@ -16,8 +16,8 @@ from palette4d import _core
 F64 = NDArray[np.float64]
 
 #: `layout.inc` of the kernel: numbers of the head, where it says where picks are and which display
-#: curve, numbers of a pick, and where in it its plan, its strength and its window begin; of a hold.
-HEAD, PICKS, DISPLAY, PICK, PLAN, STRENGTH, WINDOW, HOLD = 28, 14, 17, 31, 13, 21, 25, 9
+#: curve, numbers of a pick, and where in it its plan, its strength and its shade begin; of a hold.
+HEAD, PICKS, DISPLAY, PICK, PLAN, STRENGTH, SHADE, HOLD = 28, 14, 17, 33, 13, 21, 26, 9
 #: Part of a number of the table, or of 1, by which an interpolated one may differ.
 TOLERANCE = 4e-6
 
@@ -164,7 +164,7 @@ def _fill(table: F64, picks: int, count: int) -> None:
             continue
         for frame in np.setdiff1d(np.arange(len(table)), on):
             part[frame] = part[on[np.argmin(np.abs(on - frame))]]
-            part[frame, slice(STRENGTH, WINDOW) if is_pick else -1] = 0
+            part[frame, slice(STRENGTH, SHADE) if is_pick else -1] = 0
 
 
 def _keys(times: F64, table: F64) -> list[int]:

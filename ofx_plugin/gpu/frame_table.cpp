@@ -198,7 +198,8 @@ void add_picks(const Recolourer& map, const CleanUp::Place* place, FrameTable& r
         const PickPlan<float>::One& one = plan.picks[i];
         const float values[] = {one.at[0],    one.at[1],     one.at[2],     one.along[0],
                                 one.along[1], one.plain,     one.dark,      one.bright,
-                                one.strength, one.change[0], one.change[1], one.change[2]};
+                                one.strength, one.change[0], one.change[1], one.change[2],
+                                one.light,    one.shade};
         table.insert(table.end(), std::begin(values), std::end(values));
         add_window(picks.picks[i].window, picks, place, to);
     }

@@ -644,8 +644,13 @@ def recolour(
             matte = float(between(pick.matte, point(display))) * in_window(pick.window, x, y)
             near = matte * pick.strength / (apart2(point(display), point(target)) + 1e-6)
             share = near if len(picks.picks) > 1 else 1.0
-            part = matte * amount(display, target) / amount(target, target)
-            total += share * part * change
+            part = amount(display, target) / amount(target, target)
+            # Of the change's light it has no more than of the pick's lightness.
+            own, picked = (
+                np.clip(colour.mean(), 0, 1) + LEAST_LIGHT for colour in (display, target)
+            )
+            dark = max(part - own / picked, 0) * change.mean()
+            total += share * matte * (part * change - dark)
             shares.append(share)
         return total / max(sum(shares), 1e-30)
 

@@ -78,8 +78,8 @@ def limited(colours: F64) -> F64:
 
 
 def shares_of(image: NDArray[np.float32], found: _core.FramePicks) -> F64:
-    """Return the shares of their changes that picks do, (h, w, 1): changes by 1 everywhere."""
-    whole = [(colour, (1.0, 1.0, 1.0), 1.0, matte) for colour, _, _, matte in found.picks]
+    """Return the shares of their changes that picks do, (h, w, 1): of a change without light."""
+    whole = [(colour, (1.0, -1.0, 0.0), 1.0, matte) for colour, _, _, matte in found.picks]
     map_ = _core.Recolourer(TETRAHEDRON, TETRAHEDRON, FACES, picks=_core.FramePicks(whole))
     result: F64 = (map_.apply(image).astype(np.float64) - image)[..., :1]
     return result

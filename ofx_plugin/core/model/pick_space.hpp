@@ -141,7 +141,7 @@ struct PickedColour {
         return found > 1 ? 2 - 1 / found : found;
     }
 
-private:
+    /// The mean of the channels, within 0 to 1.
     static double grey_of(const Vec3& display) {
         const double grey = (display[0] + display[1] + display[2]) * (1.0 / 3);
         return std::min(std::max(grey, 0.0), 1.0);

@@ -204,6 +204,7 @@ FramePicks matte_at(const Edits& edits, const std::string& id, double frame) {
                 hold ? std::vector<Held>() : held_at(moments(edits, frame, true));
             result.picks.push_back(frame_pick(moment, held, frame));
             result.picks.back().change = {1, 1, 1};
+            result.picks.back().is_matte = true;
         }
     }
     return result;
@@ -345,12 +346,12 @@ PickMemory<T>::PickMemory(const FramePicks& picks, const std::vector<Vec3>& done
         const Vec3 shown = displayed(pick.colour, picks.display.get()), point = pick_point(shown);
         const PickedColour picked(shown);
         const double own = picked.amount(shown);
+        const Vec3 change = pick.change - (i < done.size() ? done[i] : Vec3{0, 0, 0});
         typename PickPlan<T>::One one;
         one.matte = grid(pick.matte, 0);
         for (std::size_t c = 0; c < 3; ++c) {
             one.at[c] = static_cast<T>(point[c]);
-            one.change[c] = static_cast<T>(
-                pick.strength * (pick.change[c] - (i < done.size() ? done[i][c] : 0.0)) / own);
+            one.change[c] = static_cast<T>(pick.strength * change[c] / own);
         }
         for (std::size_t c = 0; c < 2; ++c) one.along[c] = static_cast<T>(picked.along[c]);
         one.window = plan_of<T>(pick.window);
@@ -358,6 +359,9 @@ PickMemory<T>::PickMemory(const FramePicks& picks, const std::vector<Vec3>& done
         one.dark = static_cast<T>(picked.dark);
         one.bright = static_cast<T>(picked.bright);
         one.strength = static_cast<T>(pick.strength);
+        const double light = (change[0] + change[1] + change[2]) * (1.0 / 3);
+        one.light = pick.is_matte ? T(0) : static_cast<T>(pick.strength * light / own);
+        one.shade = static_cast<T>(own * picked.dark);
         picks_.push_back(one);
     }
     if (picks.left) left_ = grid(picks.left, 1);
@@ -410,14 +414,19 @@ Vec3 with_picks(const FramePicks& picks, const PickPlan<double>& plan, const Vec
         }
         const PickedColour picked({pick.along[0], pick.along[1]}, pick.plain, pick.dark,
                                   pick.bright);
-        double share = matte * picked.amount(shown);
+        const double amount = picked.amount(shown);
+        double share = matte * amount;
+        double dark =
+            matte *
+            std::max(amount - (PickedColour::grey_of(shown) + kLeastLight) * pick.shade, 0.0);
         if (plan.count > 1) {
             const double weight =
                 matte * pick.strength / (pick_distance2(point, vec3(pick.at)) + kNearestPick);
             shares += weight;
             share *= weight;
+            dark *= weight;
         }
-        for (std::size_t c = 0; c < 3; ++c) sum[c] += share * pick.change[c];
+        for (std::size_t c = 0; c < 3; ++c) sum[c] += share * pick.change[c] - dark * pick.light;
     }
     if (plan.count > 1) sum = (1 / std::max(shares, 1e-30)) * sum;
     const bool held = plan.left.values && moved != Vec3{0, 0, 0} && reaches(plan.left);

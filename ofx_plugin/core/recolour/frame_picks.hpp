@@ -1,5 +1,8 @@
 // The picks and holds of one frame, ready to recolour: D(c) = sum of m(c) a(c) change.
 //
+// Of the change's light, its mean over the channels, a colour has no more than of the pick's
+// lightness: else saturated shades would be crushed to black, or as light as the rest.
+//
 // m is the matte over colours at this frame: the learned grid with the pick's sliders, moved along
 // with the picked colour, and what holds leave of it. a is the amount of the picked colour in c: 1
 // at it, s in a shade of it s times as dark, alpha in its mixture of alpha with grey, 0 in grey. So
@@ -28,6 +31,7 @@ struct FramePick {
     double strength;  ///< how much of the change is asked for, above 0
     std::shared_ptr<const FrameMatte> matte;
     std::optional<FrameWindow> window{};  ///< none: the whole picture
+    bool is_matte = false;                ///< the change shows the amount, and has no light
 };
 
 struct FramePicks {

@@ -238,6 +238,7 @@ PALETTE4D_INLINE void add_pick(const typename PickPlan<T>::One& pick, const Read
     Lanes<T> matte = value_at<T>(pick.matte, read, at, T(0));
     if (place) matte = matte * window_at<T>(pick.window, place, at);
     Lanes<T> share = matte * amount;
+    Lanes<T> dark = matte * max(amount - (grey + least) * all(pick.shade), all(T(0)));
     if (!alone) {
         const Lanes<T> u = load(read.point[0] + at) - all(pick.at[0]),
                        v = load(read.point[1] + at) - all(pick.at[1]),
@@ -248,9 +249,11 @@ PALETTE4D_INLINE void add_pick(const typename PickPlan<T>::One& pick, const Read
             (u * u + v * v + l * l + all(static_cast<T>(palette4d::kNearestPick)));
         store(weights + at, load(weights + at) + weight);
         share = share * weight;
+        dark = dark * weight;
     }
+    dark = dark * all(pick.light);
     for (int c = 0; c < 3; ++c) {
-        store(sum[c] + at, load(sum[c] + at) + share * all(pick.change[c]));
+        store(sum[c] + at, load(sum[c] + at) + (share * all(pick.change[c]) - dark));
     }
     if (shares) store(shares + at, load(shares + at) + share);
 }

@@ -34,6 +34,8 @@ struct PickPlan {
                          ///< kLeastLight)
         T strength;
         T change[3];  ///< of a colour with amount 1
+        T light;      ///< the part of it that is the same in all channels; 0: none counts as light
+        T shade;  ///< the amount of light in a colour is its lightness plus kLeastLight, times this
     };
     const One* picks;
     int count;

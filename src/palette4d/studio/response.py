@@ -1,9 +1,9 @@
 """Pictures of a drag from its first ones: what an edit adds to a pixel is linear in what it moves.
 
-A recoloured pixel is p + sum_j a_j(p) d_j, where d_j is the displacement of a palette colour, or
-the change of a pick. The weights a_j stay while the palette and the mattes do; cleaning up is
-linear too. A drag moves few of the d_j. So one picture tells their weights, and the others are
-sums. It knows no toolkit.
+A recoloured pixel is p + sum_j (a_j(p) d_j + b_j(p) mean(d_j)), where d_j is the displacement of a
+palette colour, or the change of a pick, whose light, its mean, has a weight of its own. The weights
+stay while the palette and the mattes do; cleaning up is linear too. A drag moves few of the d_j. So
+one picture for each tells its weights, and the others are sums. It knows no toolkit.
 """
 
 from dataclasses import dataclass, field
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-#: So many weights are known from one picture: each channel has those of one colour.
-CHANNELS = 3
+#: The most colours whose weights are worth a picture each.
+MOST_MOVING = 3
 
 
 class Moves:
@@ -76,7 +76,8 @@ class Base:
     source: F32
     moves: Moves
     picture: F32
-    weights: dict[int, F32] = field(default_factory=dict)
+    #: (h, w) a and b of each colour that has moved
+    weights: dict[int, tuple[F32, F32]] = field(default_factory=dict)
 
 
 class Responses:
@@ -97,22 +98,27 @@ class Responses:
             return self._begin(source, moves)
         by = (moves.by - base.moves.by).astype(np.float32)
         rows = np.flatnonzero(by.any(axis=1)).tolist()
-        new = [row for row in rows if row not in base.weights]
-        if len(rows) > CHANNELS:
+        if len(rows) > MOST_MOVING:
             return self._begin(source, moves)
-        if new:
-            unit = base.moves.by.copy()
-            unit[new, np.arange(len(new))] += 1
-            added = base.moves.drawn(source, unit) - base.picture
-            added[~np.isfinite(added)] = 0
-            for channel, row in enumerate(new):
-                base.weights[row] = np.ascontiguousarray(added[..., channel])
         result = base.picture.copy()
         part = np.empty_like(result)
         for row in rows:
-            np.multiply(base.weights[row][..., None], by[row], out=part)
+            if row not in base.weights:
+                base.weights[row] = self._weights(base, row)
+            own, light = base.weights[row]
+            np.multiply(own[..., None], by[row], out=part)
             result += part
+            result += (light * by[row].mean())[..., None]
         return result
+
+    @staticmethod
+    def _weights(base: Base, row: int) -> tuple[F32, F32]:
+        """Return a and b of a colour, from a picture in which its red has moved by 1."""
+        unit = base.moves.by.copy()
+        unit[row, 0] += 1
+        added = base.moves.drawn(base.source, unit) - base.picture
+        added[~np.isfinite(added)] = 0
+        return added[..., 0] - added[..., 1], 3 * added[..., 1]
 
     def _begin(self, source: F32, moves: Moves) -> F32:
         picture = moves.drawn(source, moves.by)

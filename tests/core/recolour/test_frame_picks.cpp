@@ -399,3 +399,24 @@ TEST(the_picture_may_have_another_size_than_the_clip) {
         }
     }
 }
+
+TEST(saturated_shades_keep_their_part_of_the_light) {
+    // Half as light as the pick, and as saturated as far as numbers reach: its amount is nearly 1.
+    const Vec3 picked{0.6, 0.3, 0.2}, shade{0.45, 0.1, 0.0};
+    for (const Vec3& to : {Vec3{0.2, 0.15, 0.1}, Vec3{0.9, 0.75, 0.7}}) {
+        const Recolourer map = with(picks_at(edits_of({pick("a", picked, to)}), 0));
+        CHECK(gap(map.displaced(picked, 1), to) < 1e-9);
+        const Vec3 moved = map.displaced(shade, 1);
+        const auto light = [](const Vec3& c) { return (c[0] + c[1] + c[2]) / 3; };
+        // The lightness is to the new colour's as it was to the pick's.
+        CHECK_NEAR(light(moved) / light(to), light(shade) / light(picked), 0.06);
+        CHECK(*std::min_element(moved.begin(), moved.end()) > -0.02);
+        // A shade in the proper sense, and a mixture with grey, change as ever.
+        const Vec3 half = 0.5 * picked, mixed = 0.5 * picked + Vec3{0.2, 0.2, 0.2};
+        CHECK(gap(map.displaced(half, 1), half + 0.5 * (to - picked)) < 0.02);
+        CHECK(gap(map.displaced(mixed, 1), mixed + 0.5 * (to - picked)) < 0.02);
+    }
+    // Mattes show the amount.
+    const Recolourer matte = with(matte_at(edits_of({pick("a", picked, {0, 0, 0})}), "a", 0));
+    CHECK((matte.displaced(shade, 1) - shade)[2] > 0.85);
+}
