@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.common.errors import Arg, Message, Palette4dError
 from palette4d.common.text import hex_of, percent
-from palette4d.grade import follow
+from palette4d.grade import follow, follow_window
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.follow import Progress
 from palette4d.grade.grade import Grade
 from palette4d.grade.mattes import Display, Learned, learn
-from palette4d.grade.picks import ALIKE, PathKey, Pick
+from palette4d.grade.picks import ALIKE, PathKey, Pick, Window
 from palette4d.media.clip_base import describe
 from palette4d.media.source_clip import find_clip, nearest_frame
 
@@ -97,8 +97,8 @@ class ClipOfPicks:
         if (clip := find_clip(self._sidecar, self._fields, given)) is None:
             return None
         width, height = self._fields["size"]
-        frames = self._fields["frames"]
-        known = range(frames["first"], frames["last"] + 1, frames["step"])
+        first, last, step = self._frames
+        known = range(first, last + 1, step)
         if (clip.width, clip.height) != (width, height):
             raise Palette4dError(
                 f"{clip.source} has {clip.width}x{clip.height} pixels, but the palette's clip has "
@@ -183,7 +183,7 @@ class ClipOfPicks:
         clip = self.open()
         if clip is None:
             return None
-        first, last = self._fields["frames"]["first"], self._fields["frames"]["last"]
+        first, last, _ = self._frames
         frames = [frame for frame in clip.frames if first <= frame <= last]
         return learn(pick, holds, frames, self.read, display)
 
@@ -260,15 +260,40 @@ class ClipOfPicks:
 
         Returns those keys alone if the clip is missing, or if the range is a single frame.
         """
-        frames = self._fields["frames"]
-        begin, _, _, end = pick.knots(frames["step"])
-        span = max(begin, frames["first"]), min(end, frames["last"])
+        span = pick.span(self._frames)
         if span[0] >= span[1] or (clip := self.open()) is None:
             return tuple(given)
         starts = [(nearest_frame(clip, pick.frame), pick.rgb)]
         others = [key for key in given if key.frame != pick.frame]
         starts += [(nearest_frame(clip, key.frame), key.rgb) for key in others]
         return follow.paths(clip, starts, span, conversion=self._conversion, progress=progress)
+
+    def window(self, pick: Pick, window: Window, progress: Progress | None = None) -> Window:
+        """Follow a window of a pick from its given keys.
+
+        Returns it with those keys alone if the clip is missing, or if there is a single frame.
+        """
+        given = window.given
+        span = pick.span(self._frames)
+        known = {key.frame: key.box for key in given.keys}
+        low, high = min(span[0], *known), max(span[1], *known)
+        if low >= high or (clip := self.open()) is None:
+            return given
+        keys = follow_window.boxes(
+            clip,
+            {nearest_frame(clip, frame): box for frame, box in known.items()},
+            span,
+            conversion=self._conversion,
+            display=self.display,
+            progress=progress,
+        )
+        return replace(given, keys=keys)
+
+    @property
+    def _frames(self) -> tuple[int, int, int]:
+        """First and last frame number of the palette's clip, and the step between frames."""
+        frames = self._fields["frames"]
+        return frames["first"], frames["last"], frames["step"]
 
 
 def _unlike(

@@ -363,12 +363,54 @@ class Document:
         self._take(pick_edits.add_area(self.grade, self._clip(clip), id, area))
         return self.grade.pick(id)
 
+    def set_window(
+        self,
+        id: str,
+        frame: float,
+        box: Iterable[float] | None,
+        *,
+        feather: float | None = None,
+        follow: bool = True,
+        clip: OfClip | None = None,
+        progress: Progress | None = None,
+    ) -> Pick:
+        """Limit a pick to a box: beyond it the change fades out over `feather` pixels.
+
+        The box moves with what is in it, within the pick's range, and keeps its size. More boxes at
+        other frames correct it; between two of them it goes gradually from what follows the one to
+        what follows the other, and its size is linear. Where it is lost it stays where it was
+        (`Pick.lost`).
+
+        Parameters
+        ----------
+        id : str
+            A pick; a hold has no window.
+        frame : float
+            A frame of the clip.
+        box : (left, top, right, bottom) or None
+            In pixels from the clip's top left corner; it may lie outside. It replaces a box that
+            was given at this frame. None removes the window.
+        feather : float, optional
+            In pixels; 0 is a hard edge. By default it stays; that of a new window is a tenth of the
+            box's shorter side. `change_pick(id, feather=…)` changes it alone.
+        follow : bool
+            Follow the box through the clip. Without this, or without the clip, it is linear between
+            the given boxes.
+        clip, progress
+            As in `pick`.
+        """
+        own = self._clip(clip)
+        how: dict[str, Any] = {"feather": feather, "follow": follow, "progress": progress}
+        self._take(pick_edits.set_window(self.grade, own, id, frame, box, **how))
+        return self.grade.pick(id)
+
     def change_pick(self, id: str, *, clip: OfClip | None = None, **changes: Any) -> Pick:
         """Change a pick or hold: any of the attributes of `Pick` but id, kind, path and matte.
 
         `by` gives the new colour as offsets from the picked colour. A new `frame`, `rgb` or range
-        is followed again, if the pick was followed. `follow` begins or ends that. Where its place
-        or a hold changes, mattes are learned again. `any_value` and `progress` are those of `pick`.
+        is followed again, if the pick was followed; so is its window, in a new range. `follow`
+        begins or ends that. `feather` is the window's. Where its place or a hold changes, mattes
+        are learned again. `any_value` and `progress` are those of `pick`.
         """
         self._take(pick_edits.change_pick(self.grade, self._clip(clip), id, **changes))
         return self.grade.pick(id)

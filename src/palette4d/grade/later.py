@@ -19,7 +19,7 @@ from palette4d.grade.follow import Progress
 from palette4d.grade.grade import Grade
 from palette4d.grade.history import History
 from palette4d.grade.mattes import Display, Learned
-from palette4d.grade.picks import PathKey, Pick
+from palette4d.grade.picks import PathKey, Pick, Window
 
 #: A pick before and after the clip was read.
 Readings = tuple[tuple[Pick, Pick], ...]
@@ -58,6 +58,10 @@ class Unread(ClipOfPicks):
         """Return the path that the pick has."""
         return pick.path
 
+    def window(self, pick: Pick, window: Window, progress: Progress | None = None) -> Window:
+        """Return the given keys."""
+        return window.given
+
 
 def as_unread(history: History) -> History:
     """Return the history whose last step says that its clip is not read yet."""
@@ -88,7 +92,14 @@ def do_again(document: Document, step: Edit, clip: OfClip, progress: Progress | 
                 reads |= {"pixel": pick.pixel, "box": pick.box}
             if pick.id in were and (new or pick.path):
                 reads["follow"] = True
+            window, old = pick.window, were.get(pick.id)
+            kept = window is not None and old is not None and old.window == window
+            if kept:
+                reads["window"] = window
             document.change_pick(pick.id, **reads)
+            if window is not None and old is not None and not kept:
+                key = window.given.keys[-1]
+                document.set_window(pick.id, key.frame, key.box, clip=clip, progress=progress)
 
 
 def readers(step: Edit, grade: Grade) -> list[Pick]:

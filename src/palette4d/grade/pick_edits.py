@@ -17,7 +17,19 @@ from palette4d.grade.edits import Key, as_colour, new_id
 from palette4d.grade.follow import Progress
 from palette4d.grade.grade import Grade
 from palette4d.grade.mattes import Learned, odds_of
-from palette4d.grade.picks import MOST_PICKS, Area, Pick, Toward, check
+from palette4d.grade.picks import (
+    MOST_PICKS,
+    Area,
+    Pick,
+    Toward,
+    Window,
+    WindowKey,
+    as_box,
+    check,
+)
+
+#: The feather of a new window, as a share of the box's shorter side.
+FEATHER = 0.1
 
 
 class Where(TypedDict, total=False):
@@ -62,6 +74,9 @@ class Asked(When, total=False):
         Attributes of `palette4d.grade.picks.Pick`.
     any_value : bool
         Take colours such as 255 128 0 as they are.
+    window, feather : 4 floats, and float
+        The box at `frame` that the pick changes, and how far beyond it the change fades out
+        (`Document.set_window`).
     """
 
     to: Iterable[float] | str | None
@@ -71,6 +86,8 @@ class Asked(When, total=False):
     reach: float
     softness: float
     lightness: tuple[float, float]
+    window: Iterable[float] | None
+    feather: float | None
 
 
 def pick(
@@ -96,6 +113,7 @@ def pick(
     names = ("toward", "whole_hue", "reach", "softness", "lightness")
     shape = {name: given[name] for name in names if name in given}
     made = replace(picked, kind="pick", to=new, **shape)
+    made = replace(made, window=_with_key(None, frame, asked.get("window"), asked.get("feather")))
     return _add(grade, clip, made, asked, progress)
 
 
@@ -145,6 +163,59 @@ def add_area(grade: Grade, clip: ClipOfPicks, id: str, area: Area) -> Grade:
     return _learned(grade, clip, replace(old, areas=(*old.areas, area)), label)
 
 
+def set_window(
+    grade: Grade,
+    clip: ClipOfPicks,
+    id: str,
+    frame: float,
+    box: Iterable[float] | None,
+    *,
+    feather: float | None = None,
+    follow: bool = True,
+    progress: Progress | None = None,
+) -> Grade:
+    """Limit a pick to a box that moves over time, or to none (`Document.set_window`)."""
+    old = grade.pick(id)
+    if old.kind == "hold":
+        raise Palette4dError(
+            f"{id} is a hold, which has no window; expected a pick: holds keep their colours "
+            "everywhere"
+        )
+    grade.check_frame(frame)
+    clip.check_places(frame, ())
+    new = replace(old, window=_with_key(old.window, frame, box, feather))
+    check(new, grade.frames)
+    if follow:
+        new = _window_followed(clip, new, progress)
+    return grade.put("pick", id, new, f"change {id}: {_window_text(new, frame)}")
+
+
+def _with_key(
+    window: Window | None, frame: float, box: Iterable[float] | None, feather: float | None
+) -> Window | None:
+    """Return a window's given keys with a box at a frame; no window without a box."""
+    if box is None:
+        if feather is not None:
+            raise Palette4dError(
+                f"found {Arg('feather')} without a box of the window, expected both"
+            )
+        return None
+    key = WindowKey(frame, as_box(box), given=True)
+    if window is None:
+        left, top, right, bottom = key.box
+        width = round(FEATHER * min(right - left, bottom - top), 1) if feather is None else feather
+        return Window(float(width), (key,))
+    keys = {each.frame: each for each in window.keys if each.given} | {frame: key}
+    width = window.feather if feather is None else float(feather)
+    return Window(width, tuple(keys[at] for at in sorted(keys)))
+
+
+def _window_followed(clip: ClipOfPicks, pick: Pick, progress: Progress | None) -> Pick:
+    if pick.window is None:
+        return pick
+    return replace(pick, window=clip.window(pick, pick.window, progress))
+
+
 def change_pick(
     grade: Grade,
     clip: ClipOfPicks,
@@ -158,6 +229,14 @@ def change_pick(
 ) -> Grade:
     """Change a pick or hold (`Document.change_pick`)."""
     old = grade.pick(id)
+    if (feather := changes.pop("feather", None)) is not None:
+        window = changes.get("window", old.window)
+        if window is None:
+            raise Palette4dError(
+                f"{id} has no window, so that it has no feather; expected a box first: "
+                f"`window {id} --frame T --box L,T,R,B`"
+            )
+        changes["window"] = replace(window, feather=float(feather))
     if changes.get("pixel") is not None and "rgb" not in changes:
         frame, box = changes.get("frame", old.frame), changes.get("box") or 1
         grade.check_frame(frame)
@@ -168,7 +247,7 @@ def change_pick(
     for name in ("rgb", "to"):
         if name in changes:
             changes[name] = grade.checked(changes[name], any_value)
-    bad = {"to", "toward", "whole_hue", "reach", "softness", "lightness"} & changes.keys()
+    bad = {"to", "toward", "whole_hue", "reach", "softness", "lightness", "window"} & changes.keys()
     if old.kind == "hold" and bad:
         raise Palette4dError(f"{id} is a hold, which has no {' and no '.join(sorted(bad))}")
     new = _with_one_fade(replace(old, **changes))
@@ -180,6 +259,12 @@ def change_pick(
     elif follow or (moved and old.path):
         given = tuple(key for key in old.path if key.given and key.frame != old.frame)
         new = replace(new, path=clip.path(new, given, progress))
+    if (window := new.window) is not None and "window" not in changes:
+        ranged = {"start", "until", "fade", "fade_out"} & changes.keys()
+        if follow is False:
+            new = replace(new, window=window.given)
+        elif follow or (ranged and window != window.given):
+            new = _window_followed(clip, new, progress)
     label = f"change {id}: {_changed(old, new)}"
     if old.enabled != new.enabled:
         label = f"{'enable' if new.enabled else 'disable'} {id}"
@@ -265,6 +350,7 @@ def _add(
         clip.check_places(area.frame, area.points)
     if asked.get("follow", True):
         made = replace(made, path=clip.path(made, progress=progress))
+        made = _window_followed(clip, made, progress)
     for other in grade.picks:
         if _same(replace(other, path=()) if clip.unread else other, made):
             off = "" if other.enabled else f", disabled: `enable {other.id}`"
@@ -310,7 +396,8 @@ def _with_mattes(grade: Grade, clip: ClipOfPicks, changed: Sequence[Pick]) -> Gr
 def _same(old: Pick, new: Pick) -> bool:
     """Return whether two picks ask for the same, whatever their paths and mattes are."""
     rest: dict[str, Any] = {"id": "", "enabled": True, "path": (), "matte": None}
-    return bool(old.path) == bool(new.path) and replace(old, **rest) == replace(new, **rest)
+    asked = [replace(pick, **rest, window=pick.window and pick.window.given) for pick in (old, new)]
+    return bool(old.path) == bool(new.path) and asked[0] == asked[1]
 
 
 def _changed(old: Pick, new: Pick) -> str:
@@ -329,11 +416,22 @@ def _changed(old: Pick, new: Pick) -> str:
             f"softness {pick.softness:g}",
             f"lightness {pick.lightness[0]:g} to {pick.lightness[1]:g}",
             "followed" if pick.path else "not followed",
+            _window_text(pick),
         )
         for pick in (old, new)
     ]
     changes = [after for before, after in zip(*texts, strict=True) if before != after]
     return ", ".join(changes) or _asked(new)
+
+
+def _window_text(pick: Pick, frame: float | None = None) -> str:
+    """Return a pick's window for people, at a frame or at its first given one."""
+    if pick.window is None:
+        return "no window"
+    if frame is None:
+        frame = next((key.frame for key in pick.window.keys if key.given), pick.frame)
+    box = ",".join(f"{side:g}" for side in pick.window.box_at(frame))
+    return f"window {box} at frame {frame:g}, feather {pick.window.feather:g}"
 
 
 def _with_one_fade(pick: Pick) -> Pick:
@@ -351,4 +449,6 @@ def _asked(pick: Pick) -> str:
         text += f", {range_text(pick.start, pick.until)}"
     if any(pick.fades):
         text += f", {fades_text(*pick.fades)}"
+    if pick.window is not None:
+        text += f", {_window_text(pick)}"
     return text

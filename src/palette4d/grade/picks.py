@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from palette4d.common.errors import Palette4dError
 from palette4d.grade.edits import Colour, as_colour
 
+F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 Kind = Literal["pick", "hold"]
 Toward = Literal["shift", "colour"]
@@ -74,6 +75,18 @@ class Area:
 Box = tuple[float, float, float, float]
 
 
+def as_box(sides: Iterable[float]) -> Box:
+    """Return left, top, right and bottom as a box."""
+    values = [float(side) for side in sides]
+    if len(values) != 4 or not all(map(math.isfinite, values)):
+        raise Palette4dError(
+            f"found a box of {', '.join(f'{value:g}' for value in values) or 'nothing'}, expected "
+            "left, top, right and bottom in pixels"
+        )
+    left, top, right, bottom = values
+    return left, top, right, bottom
+
+
 @dataclass(frozen=True)
 class WindowKey:
     """A window's box at a frame; `given` by the user, or followed.
@@ -102,6 +115,23 @@ class Window:
         frames = [key.frame for key in self.keys]
         sides = np.array([key.box for key in self.keys]).T
         return np.array([np.interp(frame, frames, side) for side in sides])
+
+    @property
+    def given(self) -> Window:
+        """The window with the user's keys alone; all keys where none is the user's."""
+        given = tuple(key for key in self.keys if key.given)
+        return dataclasses.replace(self, keys=given or self.keys)
+
+    def weights(self, frame: float, width: int, height: int) -> F32:
+        """Return how much of the change each pixel of the clip gets at a frame, (h, w), 0..1."""
+        left, top, right, bottom = self.box_at(frame)
+        x, y = np.arange(width) + 0.5, np.arange(height) + 0.5
+        across = np.maximum(np.maximum(left - x, x - right), 0)
+        down = np.maximum(np.maximum(top - y, y - bottom), 0)
+        square = across**2 + down[:, None] ** 2
+        if self.feather == 0:
+            return np.asarray(square == 0, np.float32)
+        return np.asarray((1 - np.minimum(square / self.feather**2, 1)) ** 2, np.float32)
 
 
 @dataclass(frozen=True)
@@ -281,6 +311,27 @@ class Pick:
         start = -math.inf if self.start is None else self.start
         until = math.inf if self.until is None else self.until
         return start - max(self.fade, step), start, until, until + max(self.fades[1], step)
+
+    def span(self, frames: tuple[int, int, int]) -> tuple[float, float]:
+        """Return the first and the last frame of a clip's frames that the pick changes."""
+        first, last, step = frames
+        begin, _, _, end = self.knots(step)
+        return max(begin, first), min(end, last)
+
+    def lost(self, frames: tuple[int, int, int]) -> tuple[float | None, float | None]:
+        """Return the frame until which, and the one from which, the window could not be followed.
+
+        There it stays where it was. None where it was followed to the end of the range in a clip's
+        frames (first, last, step), or not at all.
+        """
+        keys = () if self.window is None else self.window.keys
+        if all(key.given for key in keys):
+            return None, None
+        low, high = self.span(frames)
+        first, last, step = keys[0], keys[-1], frames[2]
+        before = first.frame if not first.given and first.frame - step >= low else None
+        after = last.frame if not last.given and last.frame + step <= high else None
+        return before, after
 
     @property
     def fades(self) -> tuple[float, float]:
