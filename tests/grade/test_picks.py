@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 from grade.test_answer import document_of
 
-from palette4d.grade import mattes, pick_edits
+import palette4d
+from palette4d.common.errors import Palette4dError
+from palette4d.grade import later, mattes, pick_edits
 from palette4d.grade.clip_colours import ClipColours
 from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.document import Document
 from palette4d.grade.later import with_readings
-from palette4d.grade.picks import PathKey, Pick
+from palette4d.grade.picks import PathKey, Pick, Window, WindowKey
+from palette4d.media.array_clip import ArrayClip
 
 GREY = (0.5, 0.5, 0.5)
 SPLIT = Path(__file__).parents[1] / "golden" / "sidecars" / "v1_split.p4d.json"
@@ -90,3 +93,169 @@ def test_another_pixel_without_a_box_is_that_pixel(monkeypatch: pytest.MonkeyPat
     document.change_pick("p1", pixel=(20, 10))
     pick = document.grade.pick("p1")
     assert (pick.box, pick.rgb) == (1, pytest.approx((0.8, 0.3, 0.2), abs=0.04))
+
+
+def moving(monkeypatch: pytest.MonkeyPatch, frames: int = 6) -> Document:
+    """A red thing that moves by 6 pixels a frame before a wall, and another one that stays."""
+    rng = np.random.default_rng(0)
+    wall = 0.5 + 0.08 * rng.normal(size=(60, 120, 1)) * np.ones(3)
+    thing = np.float64([0.7, 0.15, 0.15]) * (1 + 0.2 * rng.normal(size=(20, 20, 1)))
+    pictures = np.tile(wall, (frames, 1, 1, 1))
+    for frame in range(frames):
+        pictures[frame, 20:40, 10 + 6 * frame : 30 + 6 * frame] = thing
+        pictures[frame, 20:40, 90:110] = thing[::-1]
+    pixels = pictures.clip(0, 1).astype(np.float32)
+    clip = ArrayClip(pixels)
+    monkeypatch.setattr("palette4d.grade.clip_of_picks.find_clip", lambda *_: clip)
+    return palette4d.analyze(pixels, vertices=8)
+
+
+BOX = (6.0, 16.0, 34.0, 44.0)
+
+
+def test_a_window_fades_out_beyond_its_box() -> None:
+    keys = (WindowKey(0, (2, 1, 4, 3), True), WindowKey(10, (12, 1, 14, 3)))
+    weights = Window(4.0, keys).weights(0, 10, 4)
+    assert weights.shape == (4, 10)
+    assert weights.dtype == np.float32
+    assert weights[1, 2:4].tolist() == [1, 1]
+    assert weights[1, 4] == pytest.approx((1 - 0.5**2 / 16) ** 2)
+    assert weights[3, 4] == pytest.approx((1 - 2 * 0.5**2 / 16) ** 2)
+    assert weights[1, 8] == 0
+    assert Window(0.0, keys).weights(0, 10, 4).sum() == 4
+    assert Window(0.0, keys).weights(5, 10, 4)[2].tolist() == [0, 0, 0, 0, 0, 0, 0, 1, 1, 0]
+
+
+def test_a_window_follows_its_thing(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = moving(monkeypatch)
+    document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
+    pick = document.set_window("p1", 0, BOX)
+    assert pick.window is not None
+    assert pick.window.feather == 2.8
+    assert pick.window.box_at(5) == pytest.approx(np.add(BOX, (30, 0, 30, 0)), abs=0.5)
+    assert pick.lost(document.grade.frames) == (None, None)
+    assert document.history.done[-1].label == (
+        "change p1: window 6,16,34,44 at frame 0, feather 2.8"
+    )
+    # At a frame that has a given box it is replaced; at another one a box is added.
+    pick = document.set_window("p1", 0, (6, 16, 34, 46), feather=5)
+    pick = document.set_window("p1", 5, (36, 16, 64, 44))
+    assert pick.window is not None
+    assert pick.window.feather == 5
+    assert [key for key in pick.window.keys if key.given] == [
+        WindowKey(0, (6, 16, 34, 46), True),
+        WindowKey(5, (36, 16, 64, 44), True),
+    ]
+    assert pick.window.box_at(2)[3] == pytest.approx(45.2, abs=0.5)
+    # Without following, and when that begins and ends.
+    pick = document.set_window("p1", 2, (20, 16, 48, 44), follow=False)
+    assert pick.window is not None
+    assert [key.frame for key in pick.window.keys] == [0, 2, 5]
+    document.set_window("p1", 0, None)
+    pick = document.set_window("p1", 0, BOX, follow=False)
+    assert pick.window == Window(2.8, (WindowKey(0, BOX, True),))
+    assert document.change_pick("p1", follow=True).window != pick.window
+    assert document.change_pick("p1", follow=False).window == pick.window
+
+
+def test_a_new_range_is_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = moving(monkeypatch)
+    document.pick(0, pixel=(20, 30), box=9, to="#2040b0", until=2, window=BOX, feather=3)
+    window = document.grade.pick("p1").window
+    assert window is not None
+    assert window.keys[-1].frame == 3  # a ramp of one frame
+    window = document.change_pick("p1", until=None).window
+    assert window is not None
+    assert window.box_at(5) == pytest.approx(np.add(BOX, (30, 0, 30, 0)), abs=0.5)
+    assert window.feather == 3
+
+
+def test_the_feather_changes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = moving(monkeypatch)
+    document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
+    with pytest.raises(Palette4dError, match="p1 has no window"):
+        document.change_pick("p1", feather=3)
+    before = document.set_window("p1", 0, BOX).window
+    assert before is not None
+    after = document.change_pick("p1", feather=8.5).window
+    assert after == replace(before, feather=8.5)
+    assert "feather 8.5" in document.history.done[-1].label
+
+
+def test_windows_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = moving(monkeypatch)
+    document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
+    document.hold(0, pixel=(100, 30), box=9)
+    state = document.grade.state
+    for id_, frame, box, feather, says in (
+        ("p2", 0, BOX, None, "p2 is a hold, which has no window"),
+        ("p1", 9, BOX, None, "outside of the clip"),
+        ("p1", 1.5, BOX, None, "no frame 1.5"),
+        ("p1", 0, (30, 16, 20, 44), None, "a left edge before the right one"),
+        ("p1", 0, (20, 44, 30, 16), None, "a top above the bottom"),
+        ("p1", 0, (20, 44, 30), None, "expected left, top, right and bottom"),
+        ("p1", 0, (20, 4, 30, float("nan")), None, "expected left, top, right and bottom"),
+        ("p1", 0, BOX, -1, "found a feather of -1 pixels"),
+        ("p1", 0, None, 3, "without a box"),
+    ):
+        with pytest.raises(Palette4dError, match=says):
+            document.set_window(id_, frame, box, feather=feather)
+    with pytest.raises(Palette4dError, match="without a box"):
+        document.pick(0, pixel=(20, 30), box=9, to="#2040c0", feather=3)
+    with pytest.raises(Palette4dError, match="no window"):
+        document.change_pick("p2", window=Window(0, (WindowKey(0, BOX, True),)))
+    assert document.grade.state == state
+
+
+def test_a_window_is_undone_kept_in_versions_saved_and_merged(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    document = moving(monkeypatch)
+    document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
+    document.save_version("everywhere")
+    window = document.set_window("p1", 0, BOX).window
+    assert document.undo().label.startswith("change p1: window")
+    assert document.grade.pick("p1").window is None
+    document.redo()
+    assert document.grade.pick("p1").window == window
+    assert document.version("everywhere").grade.pick("p1").window is None
+    path = tmp_path / "a.p4d.json"
+    document.save(path)
+    assert Document.load(path).grade.pick("p1").window == window
+    # Another program changes another pick meanwhile.
+    other = Document.load(path)
+    other.pick(0, pixel=(60, 8), box=9, by=(0, 0.1, 0))
+    other.save()
+    document.set_window("p1", 0, (0, 0, 60, 60), feather=9)
+    document.save()
+    merged = Document.load(path).grade
+    assert [pick.id for pick in merged.picks] == ["p1", "p2"]
+    assert merged.pick("p1").window == document.grade.pick("p1").window
+    document.change_pick("p1", enabled=False)
+    assert document.change_pick("p1", enabled=True).window == merged.pick("p1").window
+    # The same pick with another window is another one.
+    same = {"pixel": (20, 30), "box": 9, "to": "#2040b0"}
+    with pytest.raises(Palette4dError, match="p1 is this pick already"):
+        document.pick(0, **same, window=(0, 0, 60, 60), feather=9)
+    assert document.pick(0, **same, window=BOX).id == "p3"
+
+
+def test_a_window_is_followed_when_the_clip_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = moving(monkeypatch)
+    document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
+    before = document.grade
+    document.set_window("p1", 0, BOX, clip=later.Unread())
+    document.history = later.as_unread(document.history)
+    made, step = document.grade, document.history.done[-1]
+    assert made.pick("p1").window == Window(2.8, (WindowKey(0, BOX, True),))
+    # The program that made it ended: the next one does it again.
+    trial = Document(before)
+    later.do_again(trial, step, ClipOfPicks.of(before), None)
+    window = trial.grade.pick("p1").window
+    assert window is not None
+    assert window.box_at(5) == pytest.approx(np.add(BOX, (30, 0, 30, 0)), abs=0.5)
+    readings = later.readings_of(trial.grade, made)
+    steps = step, trial.history.done[-1]
+    grade, history = later.completed(made, document.history, steps, readings, {})
+    assert grade.pick("p1") == trial.grade.pick("p1")
+    assert not history.done[-1].unread
