@@ -123,15 +123,16 @@ class Window:
         return dataclasses.replace(self, keys=given or self.keys)
 
     def weights(self, frame: float, width: int, height: int) -> F32:
-        """Return how much of the change each pixel of the clip gets at a frame, (h, w), 0..1."""
+        """Return how much of the change each pixel of the clip gets at a frame, (h, w), 0..1.
+
+        A feather below 1 pixel is 1 pixel.
+        """
         left, top, right, bottom = self.box_at(frame)
         x, y = np.arange(width) + 0.5, np.arange(height) + 0.5
         across = np.maximum(np.maximum(left - x, x - right), 0)
         down = np.maximum(np.maximum(top - y, y - bottom), 0)
-        square = across**2 + down[:, None] ** 2
-        if self.feather == 0:
-            return np.asarray(square == 0, np.float32)
-        return np.asarray((1 - np.minimum(square / self.feather**2, 1)) ** 2, np.float32)
+        square = (across**2 + down[:, None] ** 2) / max(self.feather, 1) ** 2
+        return np.asarray((1 - np.minimum(square, 1)) ** 2, np.float32)
 
 
 @dataclass(frozen=True)
@@ -388,10 +389,6 @@ def check(pick: Pick, frames: tuple[int, int, int]) -> None:
 
 
 def _check_window(window: Window) -> None:
-    if not 0 <= window.feather <= MOST_PIXELS:
-        raise Palette4dError(
-            f"found a feather of {window.feather:g} pixels, expected 0 to {MOST_PIXELS:g}"
-        )
     for key in window.keys:
         left, top, right, bottom = key.box
         if not (-MOST_PIXELS <= left < right <= MOST_PIXELS):
@@ -404,6 +401,10 @@ def _check_window(window: Window) -> None:
                 f"found a window from {top:g} to {bottom:g} from the top, expected a top above the "
                 "bottom"
             )
+    if not 0 <= window.feather <= MOST_PIXELS:
+        raise Palette4dError(
+            f"found a feather of {window.feather:g} pixels, expected 0 to {MOST_PIXELS:g}"
+        )
 
 
 def _fields_of(thing: Pick | PathKey | Area | Window | WindowKey) -> dict[str, Any]:
