@@ -279,6 +279,22 @@ def test_a_target_far_outside_is_told(run: Run) -> None:
         (("change", "p1", "--reach", "9"), 2, "8"),
         (("change", "p1", "--lightness", "0.5,0.2"), 2, "A,B"),
         (("area", "p1", "--frame", "2", "--pixel", "3,3"), 1, "p1"),
+        (("window", "p1", "--frame", "2", "--box", "3,3,9,9"), 1, "p1"),
+        (("window", "p1", "--frame", "2", "--box", "9,3,3,9"), 2, "L < R"),
+        (("window", "p1", "--frame", "2", "--box", "3,3,9"), 2, "L,T,R,B"),
+        (("window", "p1", "--frame", "2", "--box", "3,3,nan,9"), 2, "L,T,R,B"),
+        (("window", "p1", "--frame", "2", "--box", "3,3,9,9", "--none"), 2, "--none"),
+        (("window", "p1", "--box", "3,3,9,9"), 1, "--frame"),
+        (("window", "p1", "--frame", "2"), 1, "--box"),
+        (("window", "p1", "--none", "--feather", "3"), 1, "--feather"),
+        (("window", "p1", "--feather", "-3"), 2, "0"),
+        (("window", "p1"), 1, "nothing to change"),
+        (("hold", "--frame", "2", "--colour", "#336633", "--window", "3,3,9,9"), 2, "--window"),
+        (
+            ("pick", "--frame", "2", "--colour", "#336633", "--by", "0,0,0", "--feather", "3"),
+            1,
+            "--window",
+        ),
         (("lock", "v999"), 1, "v999"),
         (("unlock", "v1"), 1, "v1"),
     ],
@@ -360,3 +376,66 @@ def test_pixels_without_a_colour(tmp_path: Path, capsys: pytest.CaptureFixture[s
         assert main.main(words) == 1
         assert "has no colour" in capsys.readouterr().err
     assert main.main([*words[:7], "--box", "3", *words[7:]]) == 0
+
+
+BARN = ("--frame", "2", "--pixel", "17,8", "--box", "3", "--to", "#2040b0")
+
+
+def test_a_window_is_set_listed_changed_and_removed(path: str, run: Run) -> None:
+    assert run("pick", *BARN)[0] == 0
+    assert run("window", "p1", "--frame", "2", "--box", "13,3,23,13")[0] == 0
+    [pick] = picks_of(path)
+    assert pick["window"]["feather"] == 1
+    assert {"frame": 2, "box": [13, 3, 23, 13], "given": True} in pick["window"]["keys"]
+    assert json.loads(run("picks", "--json")[1])["picks"] == [pick]
+    assert "window 13,3,23,13 at frame 2; feather 1" in run("picks")[1]
+    status, out, _ = run("window", "p1", "--frame", "4", "--box", "12,3,23,13", "--feather", "3")
+    assert status == 0
+    assert "window 13,3,23,13 at frame 2, 12,3,23,13 at frame 4; feather 3" in out
+    assert re.search(r"takes \d+(\.\d)? % of frame 2", out)
+    assert "feather 2.5" in run("window", "p1", "--feather", "2.5")[1]
+    assert run("window", "p1", "--none")[0] == 0
+    assert "window" not in picks_of(path)[0]
+    labels = [step.label for step in Document.load(path).history.done]
+    assert labels[1] == "change p1: window 13,3,23,13 at frame 2, feather 1"
+    assert labels[-1] == "change p1: no window"
+
+
+def test_a_pick_may_have_its_window_at_once(
+    path: str, run: Run, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, out, _ = run("pick", *BARN, "--window=-9,3,23,13", "--feather", "2")
+    assert status == 0
+    assert "window -9,3,23,13 at frame 2; feather 2" in out
+    assert main.main(["info", path]) == 0
+    assert "1 pick (1 window)" in capsys.readouterr().out
+
+
+def test_a_window_that_is_lost_or_cannot_follow_says_so(
+    path: str, run: Run, analysed: Path
+) -> None:
+    run("pick", *BARN)
+    out = run("window", "p1", "--frame", "2", "--box", "2,1,6,3")[1]  # the flat sky
+    assert "the window is lost from frame 3" in out
+    assert "the window is lost until frame 1" in out
+    assert "window p1 --frame 3 --box L,T,R,B" in out
+    out = run("window", "p1", "--frame", "2", "--box", "2,1,6,4", "--no-follow")[1]
+    assert "feather 0.2; not followed\n" in out
+    (analysed / "clip").rename(analysed / "away")
+    try:
+        out = run("window", "p1", "--frame", "2", "--box", "2,1,6,3")[1]
+    finally:
+        (analysed / "away").rename(analysed / "clip")
+    assert re.search(r"not followed: the clip '.*' was not found; give it with --clip", out)
+
+
+def test_a_window_that_is_proposed_can_be_pasted(tmp_path: Path, run: Run, path: str) -> None:
+    from palette4d.cli.picks import _noted
+    from palette4d.grade.answer import Note
+
+    note = Note("words", gesture="window", effect="then takes 3 %", id="p1", window=(1, 2, 9, 8.5))
+    (words, command) = _noted(note, 2)
+    assert words == "words"
+    assert command == "  window p1 --frame 2 --box 1,2,9,8.5 (then takes 3 %)"
+    run("pick", *BARN)
+    assert run(*command.split(" (")[0].split())[0] == 0

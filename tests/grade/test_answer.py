@@ -319,3 +319,46 @@ def test_all_of_a_hue_takes_no_area(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(Palette4dError, match="all of its hue"):
         document.add_area("p1", Area(0, ((50.0, 60.0),), 4.0))
     assert document.grade.pick("p1") == before
+
+
+def test_a_proposed_window_leaves_the_same_colour_elsewhere(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = RED
+    picture[20:100, 120:180] = RED
+    document = document_of(monkeypatch, picture)
+    found = answer(document)
+    assert note(found, "its colour elsewhere") is not None
+    proposed = note(found, "a window around the thing")
+    assert proposed is not None
+    assert (proposed.gesture, proposed.id) == ("window", "p1")
+    assert proposed.window is not None
+    left, top, right, bottom = proposed.window
+    assert 0 < left < 20 < 60 < right < 120
+    assert 0 < top < 30 < 90 < bottom < H
+    document.set_window("p1", found.frame, proposed.window)
+    after = again(document)
+    assert proposed.effect == f"then takes {percent(after.share)}"
+    assert after.share == pytest.approx(0.1, abs=0.01)
+    assert after.notes == ()
+
+
+def test_a_thing_that_stands_alone_needs_no_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = RED
+    picture[30:90, 100:140] = 0.8, 0.2, 0.12  # a hold parts it
+    found = answer(document_of(monkeypatch, picture))
+    assert note(found, "a window") is None
+
+
+def test_what_a_window_leaves_out_of_the_marks_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = RED
+    picture[30:90, 100:140] = RED
+    document = document_of(monkeypatch, picture)
+    pick = document.pick(0, pixel=(40, 60), box=9, to="#2040b0", window=(10, 20, 70, 100))
+    document.add_area(pick.id, Area(0, ((120.0, 60.0),), 4))
+    found = note(again(document), "does not take what you marked (its window leaves that out)")
+    assert found is not None
+    assert found.warns

@@ -338,3 +338,36 @@ def test_a_few_pixels_of_a_colour_are_no_thing(
     assert (found is not None) == there
     if found is not None:
         assert (found.frame, found.rgb) == (1, pytest.approx(pick.rgb, abs=1e-6))
+
+
+def test_a_window_stays_with_its_clip() -> None:
+    source = Document(members("split"))
+    seen = source.grade.palette(8).rgb.mean(axis=0).tolist()
+    how = {"colour": seen, "by": (0.2, 0, 0), "follow": False}
+    source.pick(frame=8, **how, window=(10, 20, 30, 50))
+    source.pick(frame=9, **how)
+    target = Document(stretched(members("split"), 2, 100))
+    fit = target.copy_from(source)
+    assert [pick.window for pick in target.grade.picks] == [None, None]
+    assert fit.everywhere == ("p1",)
+    assert str(fit).endswith("without a window, since that is a place in the other clip: p1")
+
+
+def test_a_new_analysis_keeps_windows(tmp_path: Path) -> None:
+    path = tmp_path / "clip.p4d.json"
+    document = graded()
+    seen = document.grade.palette(8).rgb.mean(axis=0).tolist()
+    window = document.pick(
+        8, colour=seen, by=(0.2, 0, 0), follow=False, window=(10, 20, 30, 50)
+    ).window
+    document.save_version("windowed")
+    document.save(path)
+    fields = members("merge")
+    fields["edits"] = {"vertices": [], "stops": []}
+    fields["clip"] = {**document.fields()["clip"], "encoding": fields["clip"]["encoding"]}
+    new = Document(fields)
+    new.save(path, on_edits="keep")
+    assert any("the grade was copied" in note for note in new.notes)
+    found = Document.load(path)
+    assert found.grade.pick("p1").window == window
+    assert found.version("windowed").grade.pick("p1").window == window

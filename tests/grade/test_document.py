@@ -132,7 +132,7 @@ def test_what_is_edited_is_seen_at_once(plain: Path) -> None:
         lambda d: d.move("v1", frame=3),
         lambda d: d.move("s1", frame=7),
         lambda d: d.move("s9", frame=3),
-        lambda d: d.shift("v4", by=(1e6, 0, 0)),
+        lambda d: d.adjust("v4", by=(1e6, 0, 0)),
         lambda d: d.reset("v99"),
         lambda d: d.reset("e1"),
         lambda d: d.grade.near((0, 0, 0), frame=21),

@@ -16,7 +16,7 @@ GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_edite
 EDITS: list[Callable[[Grade], Grade]] = [
     lambda grade: handle_edits.set_colour(grade, "v1", (1.0, 0.0, 0.5)),
     lambda grade: handle_edits.stop(grade, "e1", 3, (1.0, 0.0, 0.5))[0],
-    lambda grade: handle_edits.shift(grade, "v1", (0.1, 0.0, 0.0)),
+    lambda grade: handle_edits.adjust(grade, "v1", by=(0.1, 0.0, 0.0))[0],
     lambda grade: handle_edits.move(grade, "s1", 2),
     lambda grade: handle_edits.adjust(grade, hue=20)[0],
     lambda grade: handle_edits.set_near(grade, (0.1, 0.1, 0.1), frame=3, by=(0.1, 0, 0))[0],

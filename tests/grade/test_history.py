@@ -37,7 +37,7 @@ def test_steps_are_undone_in_other_sessions(plain: Path) -> None:
         lambda d: d.set_ramp("smooth"),
         lambda d: d.set_ramp("hold", "s1"),
         lambda d: d.move("s1", frame=4),
-        lambda d: d.shift("s1", by=(0.1, 0, -0.1)),
+        lambda d: d.adjust("s1", by=(0.1, 0, -0.1)),
         lambda d: d.set_near((0.2, 0.2, 1), frame=9, rgb=(1, 0, 0)),
         lambda d: d.reset("v8"),
         lambda d: d.reset(),

@@ -200,7 +200,7 @@ def test_windows_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     ):
         with pytest.raises(Palette4dError, match=says):
             document.set_window(id_, frame, box, feather=feather)
-    with pytest.raises(Palette4dError, match="without a box"):
+    with pytest.raises(Palette4dError, match="without window"):
         document.pick(0, pixel=(20, 30), box=9, to="#2040c0", feather=3)
     with pytest.raises(Palette4dError, match="no window"):
         document.change_pick("p2", window=Window(0, (WindowKey(0, BOX, True),)))

@@ -131,7 +131,7 @@ def test_what_cannot_be_saved_is_saved_elsewhere(
     session = opened.session
     assert session.document is not None
     first = session.document.grade.core.polytope.vertex_ids[0]
-    session.edit(lambda document: document.shift(first, by=(0.1, 0, 0)))
+    session.edit(lambda document: document.adjust(first, by=(0.1, 0, 0)))
     sidecar.unlink()
     sidecar.mkdir()  # nothing can be written there
     assert not session.save()

@@ -127,7 +127,7 @@ def test_a_failed_analysis_offers_the_fields_that_help(opened: Window, qtbot: An
     assert isinstance(edits, QComboBox)
     kept = opened.session.document
     assert kept is not None
-    kept.shift(kept.fields()["polytope"]["vertices"][0]["id"], by=(0.1, 0.0, 0.0))
+    kept.adjust(kept.fields()["polytope"]["vertices"][0]["id"], by=(0.1, 0.0, 0.0))
     opened.session.save()
     edits.setCurrentIndex(0)  # refuse
     dialog.start()
@@ -267,7 +267,7 @@ def test_undo_brings_back_the_palette_before_an_analysis(
     assert sidecar.read_bytes() == after
     # An edit after it is undone first.
     first = session.document.grade.core.polytope.vertex_ids[0]
-    session.edit(lambda document: document.shift(first, by=(0.1, 0, 0)))
+    session.edit(lambda document: document.adjust(first, by=(0.1, 0, 0)))
     opened._do("undo")
     assert len(session.document.grade.core.polytope.vertex_ids) == 9
     opened._do("undo")

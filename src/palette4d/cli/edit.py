@@ -422,7 +422,7 @@ def run_move(args: argparse.Namespace) -> int:
         document.move(args.id, frame=args.frame)
     if args.by is not None:
         before = document.grade.colour(args.id)
-        document.shift(args.id, by=args.by, any_value=args.any_value)
+        document.adjust(args.id, by=args.by, any_value=args.any_value)
         after = document.grade.colour(args.id)
         lines.append(f"{document.grade.named(args.id)}: {shown(before)} -> {shown(after)}")
     document.save()

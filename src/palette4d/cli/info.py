@@ -111,6 +111,7 @@ def info_of(document: "Document") -> dict[str, Any]:
         "edited_vertices": len(edited),
         "ramp": document.grade.ramp,
         "picks": len(fields["edits"].get("picks", [])),
+        "windows": sum("window" in pick for pick in fields["edits"].get("picks", [])),
         "edit": fields["extra"].get("edit"),
         "locks": fields["edits"].get("locks", []),
         "versions": list(document.grade.versions),
@@ -252,6 +253,7 @@ def _print_head(info: dict[str, Any]) -> None:
         f"edits     {counted(info['edited_vertices'], 'vertex', 'vertices')}, "
         f"{counted(info['stops'], 'stop')}"
         + (f", {counted(info['picks'], 'pick')}" if info["picks"] else "")
+        + (f" ({counted(info['windows'], 'window')})" if info["windows"] else "")
         + (f", {counted(len(info['locks']), 'lock')}" if info["locks"] else "")
         + (f", {RAMP_WORDS[info['ramp']]} ramps" if info["ramp"] != "linear" else "")
         + (f"; {counted(info['steps'], 'step')} to undo" if info["steps"] else "")

@@ -1,4 +1,4 @@
-"""The actions of `edit` for picks: pick, hold, area, change, enable, unpick, lock, picks, …"""
+"""The actions of `edit` for picks: pick, hold, area, window, change, enable, unpick, lock, …"""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def add_actions(action: Action) -> None:
     """Add the actions to `edit`; `action` adds one from its name, usage and description."""
     pick = action(
         "pick",
-        f"{_WHERE} (--to C2 | --by DR,DG,DB | --with ID) {_WHEN}",
+        f"{_WHERE} (--to C2 | --by DR,DG,DB | --with ID) {_WHEN} [--window L,T,R,B]",
         "change a thing's colour into another one, and nothing else. What is connected with the "
         "place is the thing: its colours are learned from the frame and from a few others, and "
         "followed through the clip. With --with, say where the colour of an earlier pick is at "
@@ -68,6 +68,7 @@ def add_actions(action: Action) -> None:
         "--clip", metavar="CLIP", help="the clip (default: the sidecar's, if it is there)"
     )
     area.set_defaults(run=run_area)
+    _add_window(action)
     for parser, name in ((pick, "pick"), (hold, "hold")):
         _add_where(parser)
         _add_how(parser)
@@ -76,9 +77,12 @@ def add_actions(action: Action) -> None:
         )
         parser.set_defaults(run=run_pick)
     _add_new(pick)
-    hold.set_defaults(
-        to=None, by=None, toward=None, whole_hue=None, reach=None, softness=None, lightness=None
+    pick.add_argument(
+        "--window", type=_box_of_window, metavar="L,T,R,B", help="as --box of the action `window`"
     )
+    pick.add_argument("--feather", type=number(0, 1e6), metavar="N", help="of the window")
+    nothing = ("to", "by", "toward", "whole_hue", "reach", "softness", "lightness", "window")
+    hold.set_defaults(**dict.fromkeys((*nothing, "feather")))
     _add_change(action)
     for name, text in (
         ("enable", "switch picks and holds on again."),
@@ -214,6 +218,43 @@ def _add_change(action: Action) -> None:
     parser.set_defaults(run=run_change)
 
 
+def _add_window(action: Action) -> None:
+    parser = action(
+        "window",
+        "ID [--frame T (--box L,T,R,B | --none)] [--feather N] [--no-follow]",
+        "limit a pick to a box, beyond which the change fades out. The box moves with what is in "
+        "it; more boxes at other frames correct it. Where it is lost it stays. --feather alone "
+        "changes the feather of all frames.",
+    )
+    add = parser.add_argument
+    add("id", metavar="ID", help="p1, p2, …")
+    add("--frame", type=number(), metavar="T", help="the frame of the box")
+    box = parser.add_mutually_exclusive_group()
+    box.add_argument(
+        "--box",
+        type=_box_of_window,
+        metavar="L,T,R,B",
+        help="left, top, right and bottom in pixels from the top left corner; they may lie "
+        "outside of the picture: --box=-50,0,200,90",
+    )
+    box.add_argument("--none", action="store_true", help="remove the window")
+    add(
+        "--feather",
+        type=number(0, 1e6),
+        metavar="N",
+        help="pixels beyond the box over which the change fades out; 0: a hard edge (default of a "
+        "new window: a tenth of the box's shorter side)",
+    )
+    add(
+        "--follow",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="whether the box moves with what is in it (default), or is where it was given",
+    )
+    add("--clip", metavar="CLIP", help="the clip (default: the sidecar's, if it is there)")
+    parser.set_defaults(run=run_window)
+
+
 def _pixel(text: str) -> tuple[float, float]:
     try:
         x, y = (float(part) for part in text.split(","))
@@ -222,6 +263,19 @@ def _pixel(text: str) -> tuple[float, float]:
     if not (math.isfinite(x) and math.isfinite(y)):
         raise argparse.ArgumentTypeError(f"found {text!r}, expected X,Y, such as 320,180")
     return x, y
+
+
+def _box_of_window(text: str) -> tuple[float, float, float, float]:
+    try:
+        left, top, right, bottom = (float(part) for part in text.split(","))
+    except ValueError:
+        left, top, right, bottom = 1, 1, 0, 0
+    if not (-1e6 <= left < right <= 1e6 and -1e6 <= top < bottom <= 1e6):
+        raise argparse.ArgumentTypeError(
+            f"found {text!r}, expected L,T,R,B with L < R and T < B in pixels, such as "
+            "320,180,640,400"
+        )
+    return left, top, right, bottom
 
 
 def _span(text: str) -> tuple[float, float]:
@@ -251,6 +305,36 @@ def run_area(args: argparse.Namespace) -> int:
     return 0
 
 
+def run_window(args: argparse.Namespace) -> int:
+    """Set, change or remove the window of a pick."""
+    if args.frame is None and args.feather is None and not args.none:
+        raise Palette4dError("found nothing to change, expected --frame with --box, or --feather")
+    if args.frame is None and args.box is not None:
+        raise Palette4dError("found --box without --frame, expected the frame of the box")
+    if args.frame is not None and args.box is None and not args.none:
+        raise Palette4dError("found --frame without --box, expected both")
+    if args.none and args.feather is not None:
+        raise Palette4dError("found --none with --feather, expected one of them")
+    document = load(args.sidecar)
+    with frames_bar("following", hidden=False) as progress:
+        if args.box is None and not args.none:
+            document.change_pick(args.id, feather=args.feather, clip=args.clip)
+        else:
+            frame = document.grade.frames[0] if args.frame is None else args.frame
+            document.set_window(
+                args.id,
+                frame,
+                args.box,
+                feather=args.feather,
+                follow=args.follow,
+                clip=args.clip,
+                progress=progress,
+            )
+    document.save()
+    _print_pick(args, document, args.id, boxed=args.follow and args.box is not None)
+    return 0
+
+
 def run_pick(args: argparse.Namespace) -> int:
     """Add a pick or a hold, or correct the path of one."""
     document = load(args.sidecar)
@@ -261,7 +345,8 @@ def run_pick(args: argparse.Namespace) -> int:
         "clip": args.clip,
         "any_value": args.any_value,
     }
-    how = {name: getattr(args, name) for name in (*_RANGE, *_MATTE, "toward", "follow")}
+    names = (*_RANGE, *_MATTE, "toward", "follow", "window", "feather")
+    how = {name: getattr(args, name) for name in names}
     given = {name: value for name, value in how.items() if value is not None}
     with frames_bar("following", hidden=False) as progress:
         if args.same is not None:
@@ -283,7 +368,8 @@ def run_pick(args: argparse.Namespace) -> int:
                 args.frame, **where, to=args.to, by=args.by, **given, progress=progress
             )
     document.save()
-    _print_pick(args, document, pick.id, followed=args.follow is not False)
+    follow = args.follow is not False
+    _print_pick(args, document, pick.id, followed=follow, boxed=follow and args.same is None)
     return 0
 
 
@@ -355,25 +441,34 @@ def run_picks(args: argparse.Namespace) -> int:
 
 
 def _print_pick(
-    args: argparse.Namespace, document: Document, id_: str, followed: bool = False
+    args: argparse.Namespace,
+    document: Document,
+    id_: str,
+    followed: bool = False,
+    boxed: bool = False,
 ) -> None:
     """Print what was asked, and what it does in its frame."""
     clip: str | None = args.clip
     for line in document.pick_warnings(id_, clip):
         tell(args, "warning", line)
     found = next(pick for pick in document.grade.picks if pick.id == id_)
-    print(_told(document, found, followed))
+    print(_told(document, found, followed, boxed))
     answer = document.answer(id_, clip) if found.enabled else None
     if answer is not None:
         verb = "takes" if answer.kind == "pick" else "keeps"
         print(f"  {verb} {percent(answer.share)} of frame {answer.frame}")
-        for line in (line for note in answer.notes for line in _noted(note)):
+        for line in (line for note in answer.notes for line in _noted(note, answer.frame)):
             print(f"  {line}")
 
 
-def _noted(note: Note) -> Iterator[str]:
-    """Yield a note of an answer, and its gesture as arguments of `edit`."""
+def _noted(note: Note, frame: int) -> Iterator[str]:
+    """Yield a note of an answer for a frame, and its gesture as arguments of `edit`."""
     text, place = "warning: " * note.warns + note.words, note.place
+    if note.window is not None:
+        box = ",".join(f"{side:g}" for side in note.window)
+        yield text
+        yield f"  window {note.id} --frame {frame} --box {box} ({note.effect})"
+        return
     if place is None:
         yield text
         return
@@ -387,8 +482,11 @@ def _noted(note: Note) -> Iterator[str]:
         yield f"  {what} {where} ({note.effect})"
 
 
-def _told(document: Document, pick: Pick, followed: bool = False) -> str:
-    """Return a pick or hold for people: what was asked, and its path."""
+def _told(document: Document, pick: Pick, followed: bool = False, boxed: bool = False) -> str:
+    """Return a pick or hold for people: what was asked, its path and its window.
+
+    `followed` and `boxed`: whether the path and the window were to be followed just now.
+    """
     from palette4d.grade.colour_moves import fades_text
 
     asked = shown(pick.rgb) + (f" -> {shown(pick.to)}" if pick.to is not None else " stays")
@@ -415,6 +513,7 @@ def _told(document: Document, pick: Pick, followed: bool = False) -> str:
         source = document.grade.core.clip["source"]
         why = f": the clip {source!r} was not found; give it with --clip" if followed else ""
         lines.append(f"  is at the same colour in all frames{why}")
+    lines += _window(document, pick, boxed)
     if pick.kind == "pick" and not pick.whole_hue and pick.matte is None:
         lines.append("  takes all of its hue: its colours could not be learned from the clip")
     shown_as = [
@@ -428,6 +527,29 @@ def _told(document: Document, pick: Pick, followed: bool = False) -> str:
     if any(shown_as):
         lines.append(f"  {', '.join(filter(None, shown_as))}")
     return "\n".join(lines)
+
+
+def _window(document: Document, pick: Pick, followed: bool) -> list[str]:
+    """Return where a pick's window is, and from where it could not be followed."""
+    if (window := pick.window) is None:
+        return []
+    given = [key for key in window.keys if key.given] or [*window.keys]
+    boxes = [f"{','.join(f'{side:g}' for side in k.box)} at frame {k.frame:g}" for k in given[:3]]
+    more = f" and {len(given) - 3} more" if len(given) > 3 else ""
+    lines = [f"  window {', '.join(boxes)}{more}; feather {window.feather:g}"]
+    if all(key.given for key in window.keys):
+        low, high = pick.span(document.grade.frames)
+        source = document.grade.core.clip["source"]
+        why = f": the clip {source!r} was not found; give it with --clip"
+        lines[0] += "; not followed" + why * (followed and low < high)
+    lost = pick.lost(document.grade.frames)
+    for frame, words in zip(lost, ("until", "from"), strict=True):
+        if frame is not None:
+            lines.append(
+                f"  warning: what is in the window is lost {words} frame {frame:g}, and there the "
+                f"window stays. Give it there: window {pick.id} --frame {frame:g} --box L,T,R,B"
+            )
+    return lines
 
 
 def _path(pick: Pick) -> list[str]:

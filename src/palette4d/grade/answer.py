@@ -21,7 +21,7 @@ from palette4d.grade.clip_of_picks import SAME_COLOUR, ClipOfPicks, largest_part
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.grade import Grade
 from palette4d.grade.pick_edits import When
-from palette4d.grade.picks import ALIKE, Area, Pick
+from palette4d.grade.picks import ALIKE, Area, Box, Pick, as_box
 from palette4d.media.source_clip import nearest_frame
 
 F32 = NDArray[np.float32]
@@ -63,24 +63,29 @@ class Note:
     words : str
     place : Place or None
         Where it is seen.
-    gesture : {"", "hold", "area"}
-        What helps there: a hold, or an area of the pick `id`. It was tried.
+    gesture : {"", "hold", "area", "window"}
+        What helps there: a hold, an area of the pick `id`, or a window of it. It was tried.
     effect : str
         What the gesture leads to.
     id : str
         The pick that the note is about.
     warns : bool
         Something does not do what it looks like.
+    window : Box or None
+        The box of a proposed window at the answer's frame, in pixels of the clip.
     """
 
     words: str
     place: Place | None = None
-    gesture: Literal["", "hold", "area"] = ""
+    gesture: Literal["", "hold", "area", "window"] = ""
     effect: str = ""
     id: str = ""
     warns: bool = False
+    window: Box | None = None
 
-    def proposing(self, gesture: Literal["hold", "area"], after: F32, cost: float = 0) -> Note:
+    def proposing(
+        self, gesture: Literal["hold", "area", "window"], after: F32, cost: float = 0
+    ) -> Note:
         """Return the note with a gesture: what it leaves of the change, and costs the thing."""
         effect = f"then takes {percent(float(after.mean()))}"
         if cost > COST:
@@ -168,13 +173,13 @@ class _View:
         """Return the same frame with another grade."""
         return replace(self, grade=grade)
 
-    def change(self, pick: Pick) -> F32:
+    def change(self, pick: Pick, *, windowed: bool = True) -> F32:
         """Return the share of a pick's change that each pixel gets, 0..1."""
         # Any palette will do: none of its colours moves.
         corner, faces = np.zeros((1, 3)), np.zeros((0, 3), np.int32)
         matte = self.grade.core.pick_matte_at(pick.id, self.frame)
         drawing = _core.Recolourer(corner, corner, faces, picks=matte)
-        drawn = drawing.apply(self.rgb, precision="single", picture=True)
+        drawn = drawing.apply(self.rgb, precision="single", picture=windowed)
         share = np.where(self.real, (drawn - self.rgb)[..., 0], 0)
         return np.clip(share, 0, 1).astype(np.float32)
 
@@ -235,6 +240,22 @@ class _View:
                 trial = pick_edits.add_area(self.grade, self.clip, pick.id, area)
         except Palette4dError:
             return None
+        return self.under(trial).change(pick)
+
+    def around(self, mask: B) -> Box:
+        """Return the box around the pixels of a mask, with as much room as its feather."""
+        spans = [np.flatnonzero(mask.any(axis=axis)) * self.every for axis in (0, 1)]
+        room = pick_edits.FEATHER * min(float(np.ptp(span)) for span in spans) + self.every
+        ends = (n * self.every for n in mask.shape[::-1])
+        (left, right), (top, bottom) = (
+            (max(0, round(span[0] - room)), min(end, round(span[-1] + self.every + room)))
+            for span, end in zip(spans, ends, strict=True)
+        )
+        return as_box((left, top, right, bottom))
+
+    def within(self, pick: Pick, box: Box) -> F32:
+        """Return a pick's change in a window."""
+        trial = pick_edits.set_window(self.grade, self.clip, pick.id, self.frame, box, follow=False)
         return self.under(trial).change(pick)
 
 
@@ -306,12 +327,10 @@ def _unmarked(it: _Thing) -> Iterator[Note]:
         marked = there.mark(area) & there.real
         left = marked & (there.change(pick) < LEAST)
         if left.sum() > 0.5 * marked.sum():
-            yield Note(
-                "does not take what you marked (it looks like what is around it; pick it too, as a "
-                "colour of its own)",
-                there.place(left),
-                warns=True,
-            )
+            why = "it looks like what is around it; pick it too, as a colour of its own"
+            if there.change(pick, windowed=False)[left].mean() > TAKEN:
+                why = "its window leaves that out"
+            yield Note(f"does not take what you marked ({why})", there.place(left), warns=True)
 
 
 def _cost(view: _View, it: _Thing, hold: Pick, without: Grade) -> list[Note] | None:
@@ -383,9 +402,10 @@ def _also(it: _Thing) -> Iterator[Note]:
         ("also takes what touches it and looks otherwise", beside),
         ("also takes its colour elsewhere", elsewhere),
     ]
+    unparted = False
     for words, others in sorted(kinds, key=lambda kind: -change[kind[1]].sum()):
         if (share := float(change[others].sum() / change.size)) <= OTHERS:
-            return
+            break
         touches = others is beside
         warns = touches and flood
         if not warns and _lost(change, left, others) > 0.5:
@@ -394,6 +414,7 @@ def _also(it: _Thing) -> Iterator[Note]:
         spot = largest_part(spot)[0]
         place = view.place(spot)
         note = Note(f"{words}, {percent(share)}", place, id=pick.id, warns=warns)
+        cost = 0.0
         after, own = view.after(pick, "hold", place), it.side(it.own, spot) & ~others
         if after is not None and _parted(change, after, spot, own):
             cost = _lost(change, after, own)
@@ -401,5 +422,20 @@ def _also(it: _Thing) -> Iterator[Note]:
                 note = note.proposing("hold", after, cost)
             if cost <= COST:
                 left = np.minimum(left, after)
+        unparted |= others is elsewhere or not note.gesture or cost > COST
         if note.gesture or others is not odd:
             yield note
+    if unparted and pick.window is None and it.marks:
+        yield from _apart(it, change)
+
+
+def _apart(it: _Thing, change: F32) -> Iterator[Note]:
+    """Propose a window around a pick's thing, if that leaves out much and costs it little."""
+    from scipy import ndimage
+
+    thing_itself = it.view.any_of([ndimage.binary_opening(it.own), *it.marks])
+    box = it.view.around(thing_itself)
+    after = it.view.within(it.pick, box)
+    if (change - after).mean() > OTHERS and _lost(change, after, it.own) <= COST:
+        note = Note("a window around the thing leaves the rest out", id=it.pick.id, window=box)
+        yield note.proposing("window", after)

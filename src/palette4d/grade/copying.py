@@ -56,6 +56,8 @@ class Fit:
         there the source's grade says little.
     left_out : tuple of str
         The picks whose colour is not in the target's clip, with what they are, for people.
+    everywhere : tuple of str
+        The ids of copied picks that have a window in the source: windows are not copied.
     """
 
     change: float
@@ -63,6 +65,7 @@ class Fit:
     largest: float
     foreign: float
     left_out: tuple[str, ...] = ()
+    everywhere: tuple[str, ...] = ()
 
     @property
     def fits(self) -> bool:
@@ -86,6 +89,11 @@ class Fit:
             text += (
                 f"; not copied, since nothing connected has the colour here: "
                 f"{', '.join(self.left_out)}"
+            )
+        if self.everywhere:
+            text += (
+                f"; without a window, since that is a place in the other clip: "
+                f"{', '.join(self.everywhere)}"
             )
         return text
 
@@ -151,8 +159,17 @@ def copied(
     after = kept.with_state({**kept.of_kind("version", "note", "lock"), **state})
     picks = (_pick(match, pick, same_clip) for pick in source.picks)
     after, left_out = taken(after, clip, [pick for pick in picks if pick is not None])
+    copies = {pick.id: pick for pick in after.picks}
+    everywhere = [
+        pick.id
+        for pick in source.picks
+        if pick.window and pick.id in copies and not copies[pick.id].window
+    ]
     label = f"copy the grade of {source.members['clip']['name']}"
-    return after.labelled(label), replace(fit(after, source, time), left_out=tuple(left_out))
+    found = replace(
+        fit(after, source, time), left_out=tuple(left_out), everywhere=tuple(everywhere)
+    )
+    return after.labelled(label), found
 
 
 def _handles_of(grade: Grade) -> Grade:
@@ -273,7 +290,7 @@ def _pick(match: Match, pick: Pick, same_clip: bool) -> Pick | None:
 
     copy = replace(pick, path=(), matte=None)
     if not same_clip:
-        copy = replace(copy, pixel=None, box=None, areas=())
+        copy = replace(copy, pixel=None, box=None, areas=(), window=None)
     copy = replace(copy, start=None, until=None, fade=0.0, fade_out=None)
     if pick.to is not None:
         copy = replace(copy, to=colour(pick.to))

@@ -220,11 +220,6 @@ class Document:
         self._take(after)
         return nearest
 
-    def shift(self, id: str, *, by: Iterable[float], any_value: bool = False) -> None:
-        """Add three offsets to the colour of a vertex or a stop."""
-        offset = self.grade.checked(by, any_value, "offset")
-        self._take(handle_edits.shift(self.grade, id, offset))
-
     def move(self, stop: str, *, frame: float) -> None:
         """Move a stop in time, within its edge."""
         self._take(handle_edits.move(self.grade, stop, frame))

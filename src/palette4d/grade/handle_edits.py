@@ -137,12 +137,6 @@ def _share(grade: Grade, vertex: str, edge: str, frame: float) -> float:
     return max(0.0, 1 - abs(frame - own) / nearest)
 
 
-def shift(grade: Grade, id: str, offset: Colour) -> Grade:
-    """Add three offsets to the colour of a vertex or a stop."""
-    new = as_colour([a + b for a, b in zip(grade.colour(id), offset, strict=True)])
-    return set_colour(grade, id, new).labelled(f"move {id} by {text_of(offset)}")
-
-
 def move(grade: Grade, stop: str, frame: float) -> Grade:
     """Move a stop in time, within its edge."""
     before = grade.settings.get(stop)

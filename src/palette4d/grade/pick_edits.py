@@ -113,7 +113,10 @@ def pick(
     names = ("toward", "whole_hue", "reach", "softness", "lightness")
     shape = {name: given[name] for name in names if name in given}
     made = replace(picked, kind="pick", to=new, **shape)
-    made = replace(made, window=_with_key(None, frame, asked.get("window"), asked.get("feather")))
+    box, feather = asked.get("window"), asked.get("feather")
+    if box is None and feather is not None:
+        raise Palette4dError(f"found {Arg('feather')} without {Arg('window')}, expected both")
+    made = replace(made, window=_with_key(None, frame, box, feather))
     return _add(grade, clip, made, asked, progress)
 
 
