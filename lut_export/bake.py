@@ -26,7 +26,7 @@ from palette4d.lut_export.bake_error import (
     load,
 )
 from palette4d.lut_export.formats import LutFormat, format_of, with_shaper
-from palette4d.lut_export.frame_edit import frame_edit
+from palette4d.lut_export.frame_edit import frame_edit, without_windows
 from palette4d.lut_export.measured_write import (
     BakeSettings,
     Job,
@@ -94,8 +94,11 @@ class BakeResult:
     has_picks : bool
         The edit has picks.
     clean_up : DeltaE or None
-        How far the file is from the picture with Clean up, which only the node and `render` have;
-        None without picks or without a clip.
+        How far the file is from the picture with Clean up and windows, which only the node and
+        `render` have; None without picks or without a clip.
+    windows : str
+        The note that the file lacks windows of picks; "" where there are none. The other errors are
+        those of the edit without windows.
     """
 
     output: str
@@ -122,6 +125,7 @@ class BakeResult:
     error: float
     has_picks: bool = False
     clean_up: DeltaE | None = None
+    windows: str = ""
 
     @property
     def visible(self) -> bool:
@@ -260,11 +264,12 @@ def bake(
         error=judged(grid, on_clip),
         has_picks=job.edit.has_picks,
         clean_up=_beside_clean_up(job, readers) if on_clip is not None else None,
+        windows=without_windows(sidecar, [frame]),
     )
 
 
 def _beside_clean_up(job: Job, readers: Mapping[str, Reader]) -> DeltaE | None:
-    """Compare the file with the cleaned-up picture; None without picks."""
+    """Compare the file with the cleaned-up picture and its windows; None without picks."""
     if job.image is None or not job.edit.has_picks:
         return None
     picture = np.ascontiguousarray(job.image)

@@ -79,6 +79,13 @@ def clip_text(
     Palette4dError where all takes more than `MOST_BYTES`; `output` is named in it.
     """
     times = _frames(sidecar, frames)
+    if windows := dict.fromkeys(id_ for time in times for id_ in sidecar.edits.windows_at(time)):
+        ids = ", ".join(windows)
+        raise Palette4dError(
+            f"{output}: found windows of {ids}, and such a file knows no places in the picture; "
+            "use the node or `palette4d render`, remove them (`window ID --none`), or disable "
+            f"{ids}"
+        )
     states = [_state(sidecar, frame) for frame in times]
     keys = keys_of(np.array(times), states)
     arrays = _arrays(times, states, keys)

@@ -29,6 +29,7 @@ from palette4d.lut_export.config_base import (
 )
 from palette4d.lut_export.config_error import LARGEST_DELTA_E, BetweenError, between_error, nearest
 from palette4d.lut_export.formats import LutFormat, format_named
+from palette4d.lut_export.frame_edit import without_windows
 from palette4d.lut_export.measured_write import BakeSettings
 from palette4d.lut_export.spaces import PALETTE
 
@@ -148,6 +149,9 @@ def write_config(
         shots.append(Shot(shot_names[k], str(sidecars[k]), spaces[k], *ends, baked[k], between[k]))
 
     notes = relocate(config, base, archive, folder)
+    for shot, sidecar, chosen in zip(shot_names, read, frames, strict=True):
+        if not format_.is_cdl and (lacks := without_windows(sidecar, chosen)):
+            notes.append(f"look {shot}: {lacks}")
     views = _add_looks(config, shots, format_, notes)
     with replacing(path, force=force) as temporary:
         temporary.write_text(config.serialize(), encoding="utf-8", newline="\n")

@@ -3,6 +3,7 @@
 Sampling, fitting and measuring take a `FrameEdit`; they know no sidecar.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,18 @@ def check_frame(sidecar: _core.Sidecar, frame: float) -> None:
         )
 
 
+def without_windows(sidecar: _core.Sidecar, frames: Iterable[float]) -> str:
+    """Return the note that LUTs of some frames lack windows of picks; "" where there are none."""
+    found = dict.fromkeys(id_ for frame in frames for id_ in sidecar.edits.windows_at(frame))
+    if not found:
+        return ""
+    ids, s = ", ".join(found), "s" * (len(found) > 1)
+    return (
+        f"no LUT has the window{s} of {ids}: it changes the colours of {ids} in the whole picture, "
+        "and errors are those of that; the node and `palette4d render` have windows"
+    )
+
+
 @dataclass(frozen=True)
 class FrameEdit:
     """The edit at one time: palette colours and picks.
@@ -38,12 +51,14 @@ class FrameEdit:
     ----------
     strength : 0 leaves colours alone, 1 is the edit.
     has_picks : whether there are picks, whose mattes need a finer LUT.
+    windows : the picks with windows: `exact` and `apply` without `clean_up` know no places.
     recolourer : the node's own code for the edit.
     conversion : from the colours' space to the palette's space; None if they are the same.
     """
 
     strength: float
     has_picks: bool
+    windows: tuple[str, ...]
     recolourer: _core.Recolourer
     conversion: _core.ColourConversion | None = None
 
@@ -55,7 +70,7 @@ class FrameEdit:
     def apply(self, colours: F32, threads: int = 0, clean_up: float = 0.0) -> F32:
         """Return the node's result for (h, w, 3) float32 colours; 0 threads: one per processor.
 
-        `clean_up` needs a picture: it looks at neighbouring pixels.
+        `clean_up` needs the clip's picture: it looks at neighbouring pixels, and windows count.
         """
         if clean_up:
             return _core.draw(
@@ -104,6 +119,7 @@ def frame_edit(
     return FrameEdit(
         strength=float(strength),
         has_picks=bool(picks.count),
+        windows=tuple(sidecar.edits.windows_at(palette.frame)),
         recolourer=_core.Recolourer(palette.rgb, edited, palette.faces, picks=picks),
         conversion=conversion,
     )

@@ -168,6 +168,17 @@ std::vector<double> pick_times_of(const NamedEdits& self) {
     return times;
 }
 
+/// The ids of picks with windows that ask for something at a frame.
+std::vector<std::string> windows_at(const NamedEdits& self, double frame) {
+    std::vector<std::string> ids;
+    for (const palette4d::Pick& pick : self.picks) {
+        if (pick.enabled && pick.window && pick.strength_at(frame, self.frame_step) > 0) {
+            ids.push_back(pick.id);
+        }
+    }
+    return ids;
+}
+
 double clamped(const BoundSidecar& self, double frame) {
     if (std::isnan(frame)) throw py::value_error("found a frame that is not a number");
     const Polytope& polytope = self.sidecar.polytope;
@@ -245,6 +256,8 @@ void bind_sidecar(py::module_& module) {
                                [](const NamedEdits& self) { return name_of(self.default_ramp); })
         .def_property_readonly("empty", &empty)
         .def_property_readonly("pick_times", &pick_times_of)
+        .def("windows_at", &windows_at, py::arg("frame"),
+             "The ids of picks with windows that ask for something at a frame.")
         .def(
             "picks_at",
             [](const NamedEdits& self, double frame) {

@@ -58,6 +58,8 @@ class Edits:
     @property
     def pick_times(self) -> list[float]:
         """Frames of enabled picks: their own, those of paths, and the ends of ranges and fades."""
+    def windows_at(self, frame: float) -> list[str]:
+        """The ids of picks with windows that ask for something at a frame."""
     def picks_at(self, frame: float) -> FramePicks:
         """The picks and holds that ask for something at a frame."""
     def with_matte_levels(self, levels: int) -> Edits:

@@ -16,6 +16,7 @@ from clip_files import write_image
 from posix_files import pipes
 
 from palette4d.cli.main import main
+from palette4d.grade.document import Document
 from palette4d.shows.manifest import Manifest, write
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
@@ -353,3 +354,26 @@ class TestReport:
         assert report["shaper"] == {"kind": "none", "low": 0.0, "high": 1.0}
         assert report["grid"]["by_reading"]["tetrahedral"]["delta_e_mean"] > 0
         assert report["viewing"]
+
+
+def windowed(tmp_path: Path) -> Path:
+    """EDITED, with a pick that has a window until frame 9."""
+    document = Document.load(EDITED)
+    seen = document.grade.palette(4).rgb.mean(axis=0)
+    where = {"colour": seen, "by": (0.2, 0, 0), "follow": False, "until": 9}
+    document.pick(4, **where, window=(1, 1, 4, 4))
+    path = tmp_path / "windowed.p4d.json"
+    document.save(path)
+    return path
+
+
+def test_a_window_that_the_file_lacks_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, words = windowed(tmp_path), ("--size", "5", "--force", "-o")
+    assert main(["bake", str(path), "--frame", "4", *words, str(tmp_path / "a.cube")]) == 0
+    assert capsys.readouterr().err.count("warning: no LUT has the window of p1: ") == 1
+    assert main(["bake", str(path), "--frame", "12", *words, str(tmp_path / "a.cube")]) == 0
+    assert "window" not in capsys.readouterr().err
+    assert main(["bake", str(path), "--frame", "4", *words, str(tmp_path / "a.cc")]) == 0
+    assert "mattes" in capsys.readouterr().err

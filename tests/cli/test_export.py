@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from palette4d.cli.main import main
+from palette4d.grade.document import Document
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 EDITED, SPLIT = GOLDEN / "v1_edited.p4d.json", GOLDEN / "v1_split.p4d.json"
@@ -218,3 +219,27 @@ def test_one_kind_of_export_is_chosen(
         dctl(*words)
     assert error.value.code == 2
     assert expected in capsys.readouterr().err
+
+
+def test_windows_that_files_lack_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document = Document.load(EDITED)
+    seen = document.grade.palette(4).rgb.mean(axis=0)
+    document.pick(4, colour=seen, by=(0.2, 0, 0), follow=False, until=9, window=(1, 1, 4, 4))
+    path = str(tmp_path / "windowed.p4d.json")
+    document.save(path)
+    words = ("--size", "5", "--jobs", "1", "--force")
+    lacks = "note: no LUT has the window of p1: "
+    for frames, told in (("4,12", 1), ("12", 0)):
+        series = ("--frames", frames, "-o", str(tmp_path / frames))
+        assert main(["export", path, *words, *series]) == 0
+        assert capsys.readouterr().err.count(lacks) == told
+    series = ("--frames", "4,12", "-o", str(tmp_path / "config"), "--anyway")
+    assert main(["config", path, *words, *series]) == 0
+    assert "note: look golden: no LUT has the window of p1: " in capsys.readouterr().err
+    for option, name in (("--dctl", "a.dctl"), ("--glsl", "a.glsl"), ("--glsl", "a.hook")):
+        assert main(["export", path, option, str(tmp_path / name)]) == 1
+        assert "found windows of p1" in capsys.readouterr().err
+        assert not (tmp_path / name).exists()
+    assert main(["export", path, "--dctl", str(tmp_path / "a.dctl"), "--frames", "12-20"]) == 0

@@ -360,3 +360,24 @@ class TestCommand:
         assert main([*arguments, "--clip", str(tmp_path / "no.####.png")]) == 1
         assert "palette4d: error:" in capsys.readouterr().err
         assert not out.exists()
+
+
+def test_errors_leave_windows_out_but_for_that_of_the_picture(tmp_path: Path) -> None:
+    golden = Path(__file__).parents[1] / "golden" / "sidecars" / "v1_edited.p4d.json"
+    document = Document.load(golden)
+    seen = document.grade.palette(4).rgb.mean(axis=0)
+    document.pick(4, colour=seen, by=(0.2, 0, 0), follow=False, window=(0, 0, 32, 36), feather=0)
+    picture = np.tile(np.float32(seen), (36, 64, 1))
+    done = bake(document, 4, tmp_path / "a.cube", clip=picture)
+    assert done.clip is not None
+    assert done.clip.worst.delta_e_largest < 1
+    assert "window of p1" in done.windows
+    # The file changes the right half too.
+    assert done.clean_up is not None
+    assert done.clean_up.most > 5
+    assert 0.4 * done.clean_up.most < done.clean_up.mean < 0.6 * done.clean_up.most
+    document.set_window("p1", 4, None)
+    done = bake(document, 4, tmp_path / "b.cube", clip=picture)
+    assert done.windows == ""
+    assert done.clean_up is not None
+    assert done.clean_up.most < 1

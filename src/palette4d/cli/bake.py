@@ -178,10 +178,13 @@ def warnings(result: BakeResult, format_: LutFormat) -> Iterator[str]:
             "a CDL moves all colours alike, so that it holds no mattes of picks; a 3D LUT (.clf, "
             ".cube) does"
         )
+    if result.windows and result.cdl is None:
+        yield result.windows
     if result.clean_up is not None and result.cdl is None and result.clean_up.most > VISIBLE:
         cleaned = result.clean_up
+        lacks = "Clean up or windows" if result.windows else "Clean up"
         yield (
-            "no LUT has Clean up: from the picture of the node and `palette4d render` the file is "
+            f"no LUT has {lacks}: from the picture of the node and `palette4d render` the file is "
             f"off by a deltaE 2000 of {stated(cleaned.mean)} on average, 99 % of the pixels by at "
             f"most {stated(cleaned.most)}"
         )

@@ -246,7 +246,9 @@ class _View:
         """Return the box around the pixels of a mask, with as much room as its feather."""
         spans = [np.flatnonzero(mask.any(axis=axis)) * self.every for axis in (0, 1)]
         room = pick_edits.FEATHER * min(float(np.ptp(span)) for span in spans) + self.every
-        ends = (n * self.every for n in mask.shape[::-1])
+        clip = self.clip.open()
+        assert clip is not None
+        ends = clip.width, clip.height
         (left, right), (top, bottom) = (
             (max(0, round(span[0] - room)), min(end, round(span[-1] + self.every + room)))
             for span, end in zip(spans, ends, strict=True)

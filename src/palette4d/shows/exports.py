@@ -17,6 +17,7 @@ from palette4d.jobs.workers import Workers
 from palette4d.lut_export import series
 from palette4d.lut_export.config import WrittenConfig, write_config
 from palette4d.lut_export.formats import format_named
+from palette4d.lut_export.frame_edit import without_windows
 from palette4d.lut_export.measured_write import BakeSettings
 from palette4d.lut_export.series import Request, Series
 from palette4d.shows import manifest as manifests
@@ -152,9 +153,11 @@ def export(
             replace(request, sidecar=file, folder=folder / shot, name=shot)
             for file, shot in zip(files, _done(manifest), strict=True)
         ]
-    requests = [
-        replace(one, frames=choose(_core.read_sidecar(str(one.sidecar)))) for one in requests
-    ]
+    read = [_core.read_sidecar(str(one.sidecar)) for one in requests]
+    requests = [replace(one, frames=choose(core)) for one, core in zip(requests, read, strict=True)]
+    for one, core in zip(requests, read, strict=True):
+        if not format_named(format).is_cdl and (lacks := without_windows(core, one.frames)):
+            notes.append(f"shot {one.name}: {lacks}" if show else lacks)
     done = series.export(requests, Workers(jobs, cluster), progress)
     references = 0
     if timeline is not None and otio is not None:
