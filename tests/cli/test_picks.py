@@ -404,7 +404,7 @@ def test_a_window_is_set_listed_changed_and_removed(path: str, run: Run) -> None
 def test_a_pick_may_have_its_window_at_once(
     path: str, run: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    status, out, _ = run("pick", *BARN, "--window=-9,3,23,13", "--feather", "2")
+    status, out, _ = run("pick", *BARN, "--window", "-9,3,23,13", "--feather", "2")
     assert status == 0
     assert "window -9,3,23,13 at frame 2; feather 2" in out
     assert main.main(["info", path]) == 0

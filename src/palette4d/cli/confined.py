@@ -16,7 +16,9 @@ from palette4d.common.errors import Palette4dError
 from palette4d.common.writer import Promise, writer_for
 
 #: The actions of `edit` that read the clip.
-READING = frozenset({"pick", "hold", "area", "change", "copy"})
+READING = frozenset(
+    {"pick", "hold", "area", "window", "change", "enable", "disable", "unpick", "copy"}
+)
 
 
 @dataclass

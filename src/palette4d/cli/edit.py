@@ -39,6 +39,7 @@ EXAMPLES = """\
   palette4d edit clip.p4d.json reset v12
   palette4d edit clip.p4d.json pick --frame 40 --pixel 320,180 --box 5 --to "#3359b3"
   palette4d edit clip.p4d.json hold --frame 40 --colour "#7a6b5c"
+  palette4d edit clip.p4d.json window p1 --frame 40 --box 240,120,400,260
   palette4d edit clip.p4d.json undo
   palette4d edit clip.p4d.json version save warm
   palette4d edit other.p4d.json copy clip.p4d.json

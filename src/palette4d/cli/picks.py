@@ -235,7 +235,7 @@ def _add_window(action: Action) -> None:
         type=_box_of_window,
         metavar="L,T,R,B",
         help="left, top, right and bottom in pixels from the top left corner; they may lie "
-        "outside of the picture: --box=-50,0,200,90",
+        "outside of the picture",
     )
     box.add_argument("--none", action="store_true", help="remove the window")
     add(
