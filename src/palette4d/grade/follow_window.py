@@ -34,9 +34,6 @@ SIDE, WIDTH = 128, 960
 #: How far the box may move from a frame to the next, as shares of its longer side and of the
 #: picture's width; the larger one counts. More: faster things are followed, in more time.
 FAST, FAST_IN_PICTURE = 0.5, 1 / 32
-#: Standard deviation of the surroundings that are taken from each pixel, as a share of the box's
-#: longer side: smooth shades are alike in all pictures. Smaller: less is left of a soft thing.
-SMOOTH = 1 / 3
 #: Correlation, -1..1, with a template that still matches. Higher: the box drifts more; lower: it is
 #: placed worse where the thing changes.
 MATCHES = 0.8
@@ -161,8 +158,8 @@ def boxes(
     frames = sorted({*inside[::every], inside[-1], *known})
     longest = max(float(np.ptp(part)) for box in known.values() for part in _inside(clip, box))
     scale = max(1, math.ceil(longest / SIDE), math.ceil(clip.width / WIDTH))
-    smooth = SMOOTH * longest / scale
-    greys = _read(clip, frames, (scale, smooth), (conversion, display), progress)
+    side = math.ceil(longest / scale)
+    greys = _read(clip, frames, (scale, side), (conversion, display), progress)
     starts = [frames.index(frame) for frame in known]
     sides = np.array([known[frame] for frame in known], float)
     corners, sizes = sides[:, :2] / scale, (sides[:, 2:] - sides[:, :2]) / scale
@@ -190,19 +187,20 @@ def _inside(clip: Clip, box: Box) -> tuple[F64, F64]:
 def _read(
     clip: Clip,
     frames: Sequence[int],
-    reduced: tuple[int, float],
+    reduced: tuple[int, int],
     conversions: tuple[_core.ColourConversion | None, Display | None],
     progress: Progress | None,
 ) -> list[I8 | None]:
-    """Return the reduced frames: the mean of their display code values, without smooth shades.
+    """Return the reduced frames: the mean of their display code values, less that around them.
 
-    `reduced` are how many pixels of a row and of a column become one, and the standard deviation of
-    what is smooth, in these. None for a frame that cannot be read.
+    `reduced` are how many pixels of a row and of a column become one, and the side of the square
+    around each of these whose mean is taken away, as smooth shades are alike in all pictures: that
+    of the box. None for a frame that cannot be read.
     """
     from scipy import ndimage
 
     greys: list[I8 | None] = []
-    (scale, smooth), (conversion, display) = reduced, conversions
+    (scale, side), (conversion, display) = reduced, conversions
     for done, frame in enumerate(frames, start=1):
         try:
             rgb = clip.straight_colours(clip.read(frame))
@@ -210,15 +208,17 @@ def _read(
             greys.append(None)
         else:
             height, width = (n // scale for n in rgb.shape[:2])
-            blocks = rgb[: height * scale, : width * scale].reshape(height, scale, width, scale, 3)
-            small = np.nan_to_num(blocks.mean(axis=(1, 3)), nan=0, posinf=1, neginf=0)
+            whole = np.ascontiguousarray(rgb[: height * scale, : width * scale])
+            rows = whole.reshape(height, scale, width * scale * 3).mean(axis=1)
+            small = rows.reshape(height, width, scale, 3).mean(axis=2)
+            small = np.nan_to_num(small, nan=0, posinf=1, neginf=0)
             if conversion is not None:
                 small = conversion.to_palette(small)
             if display is not None:
                 start, end, values = display
                 small = np.interp(small, np.linspace(start, end, len(values)), values)
             grey = 255 * small.mean(axis=2).clip(0, 1)
-            detail = grey - ndimage.gaussian_filter(grey, smooth)
+            detail = grey - ndimage.uniform_filter(grey, side or 1)
             greys.append(np.round(detail).clip(-128, 127).astype(np.int8))
         if progress:
             progress(done, len(frames))
