@@ -39,7 +39,7 @@ FAST, FAST_IN_PICTURE = 0.5, 1 / 32
 MATCHES = 0.8
 #: Where none matches, the box of the last frame may still be found: with this correlation, and so
 #: that the last frame has it where it was, up to this share of its longer side. Of 100 pairs of
-#: unlike pictures a tenth passes, of 100 neighbouring frames 98 do.
+#: unlike pictures 8 pass, of 100 neighbouring frames 98 (docs/lab/picks.md).
 LOST, BACK = 0.55, 1 / 16
 #: Least share of a template that must be in the picture, by weight.
 INSIDE = 0.5
