@@ -85,6 +85,22 @@ def test_readings_are_taken_by_the_pick_that_they_are_of() -> None:
     assert with_readings({}, readings) == {}
 
 
+def test_a_window_that_was_followed_meanwhile_keeps_its_feather() -> None:
+    given, followed = WindowKey(0, (1, 1, 5, 5), True), WindowKey(3, (2, 1, 6, 5))
+    old = Pick("p1", "pick", 0, GREY, (0.6, 0.5, 0.5), window=Window(2, (given,)))
+    readings = ((old, replace(old, matte="m1", window=Window(2, (given, followed)))),)
+    other = WindowKey(0, (1, 1, 5, 6), True)
+    for window, expected in (
+        (Window(9, (given,)), Window(9, (given, followed))),
+        (Window(2, (other,)), Window(2, (other,))),
+        (None, None),
+    ):
+        own = replace(old, window=window)
+        assert with_readings({("pick", "p1"): own}, readings) == {
+            ("pick", "p1"): replace(own, matte="m1", window=expected)
+        }
+
+
 def test_another_pixel_without_a_box_is_that_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
     picture = np.tile(np.float32([0.4, 0.4, 0.4]), (20, 30, 1))
     picture[10, 20] = 0.8, 0.3, 0.2

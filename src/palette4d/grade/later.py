@@ -170,9 +170,14 @@ def with_readings(state: State, readings: Readings) -> dict[Key, Any]:
             for field in dataclasses.fields(old)
             if getattr(old, field.name) != getattr(new, field.name)
         }
+        window = changes.pop("window", None)
         same = {*_INPUTS, *changes}
         if all(getattr(own, name) == getattr(old, name) for name in same):
-            result["pick", old.id] = replace(own, **changes)
+            own = replace(own, **changes)
+        # It depends on its boxes alone: the feather may have changed since.
+        if window and own.window and old.window and own.window.keys == old.window.keys:
+            own = replace(own, window=replace(own.window, keys=window.keys))
+        result["pick", old.id] = own
     return result
 
 
