@@ -6,8 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
-from PySide6.QtGui import QDropEvent
+from PySide6.QtCore import QEvent, QMimeData, QPointF, Qt, QUrl
+from PySide6.QtGui import QDropEvent, QMouseEvent
+from PySide6.QtWidgets import QWidget
 
 from palette4d.studio.window import Window
 
@@ -33,6 +34,14 @@ def seen(window: Window) -> Any:
     image = image.convertToFormat(image.Format.Format_RGB888)
     rows = np.array(np.frombuffer(image.constBits(), np.uint8)).reshape(image.height(), -1)
     return rows[:, : 3 * image.width()].reshape(image.height(), image.width(), 3)
+
+
+def send(
+    widget: QWidget, to: QPointF, keys: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier
+) -> None:
+    """Move the pointer with the left button down."""
+    kind, none = QEvent.Type.MouseMove, Qt.MouseButton.NoButton
+    widget.mouseMoveEvent(QMouseEvent(kind, to, to, none, Qt.MouseButton.LeftButton, keys))
 
 
 def drop(window: Window, path: str) -> None:

@@ -16,10 +16,10 @@ os.environ["QT_QPA_PLATFORM"] = "offscreen"
 pytest.importorskip("PySide6", reason="the extra palette4d[studio] is not installed")
 
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtGui import QMouseEvent, QWheelEvent
+from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
-from windows import Settle
+from windows import Settle, send
 
 import palette4d
 from palette4d.cli.main import main
@@ -547,14 +547,6 @@ def test_keys_set_the_range_at_the_playhead(qtbot: Any, opened: Window) -> None:
             lambda wanted=wanted: (picks(opened)[0].start, picks(opened)[0].until) == wanted,
             timeout=20_000,
         )
-
-
-def send(
-    widget: QWidget, to: QPointF, keys: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier
-) -> None:
-    """Move the pointer with the left button down."""
-    kind, none = QEvent.Type.MouseMove, Qt.MouseButton.NoButton
-    widget.mouseMoveEvent(QMouseEvent(kind, to, to, none, LEFT, keys))
 
 
 def wheel(widget: QWidget, at: QPointF, turns: int) -> None:

@@ -11,7 +11,7 @@ from palette4d.grade.document import Document, OfClip
 from palette4d.grade.edits import RAMP_WORDS, Ramp
 from palette4d.grade.follow import Progress
 from palette4d.grade.later import Unread
-from palette4d.grade.picks import Area, Pick
+from palette4d.grade.picks import Area, Box, Pick
 from palette4d.plotting import style
 from palette4d.studio import texts
 from palette4d.studio.session import Session
@@ -171,6 +171,57 @@ def add_area(session: Session, id_: str, area: Area) -> None:
         document.add_area(id_, area, clip=clip)
 
     session.edit_later(add, texts.AREA_ADDED.format(id=id_))
+
+
+def first_box(session: Session, pick: Pick) -> tuple[float, Box]:
+    """Return the frame and the box at which a window of a pick begins: around its place.
+
+    Its sides are a quarter of the frame's smaller side, or more, so that its marks have room.
+    """
+    assert session.document is not None
+    clip = session.document.grade.core.clip
+    least = min(clip["width"], clip["height"]) / 4
+    marks = [area for area in pick.marks if area.frame == pick.frame]
+    ends = [(at, area.radius) for area in marks for at in area.points]
+    frame, sides = pick.frame, list[tuple[float, float]]()
+    if not ends:  # a colour without a place
+        frame, ends = session.frame, [((clip["width"] / 2, clip["height"] / 2), 0.0)]
+    for axis in (0, 1):
+        low = min(at[axis] + 0.5 - radius for at, radius in ends)
+        high = max(at[axis] + 0.5 + radius for at, radius in ends)
+        half = max(least, high - low + least / 2) / 2
+        sides.append((round((low + high) / 2 - half), round((low + high) / 2 + half)))
+    (left, right), (top, bottom) = sides
+    return frame, (left, top, right, bottom)
+
+
+def set_window(session: Session, id_: str, frame: float, box: Box) -> None:
+    """Put a pick's window somewhere at a frame, and follow it from there (`window`)."""
+
+    def put(document: Document, clip: OfClip | None, progress: Progress | None) -> None:
+        document.set_window(id_, frame, box, clip=clip, progress=progress)
+
+    session.edit_later(put, texts.WINDOW_SET.format(id=id_, frame=style.number(frame)))
+
+
+def drag_window(session: Session, id_: str, frame: float, box: Box) -> None:
+    """Show a pick's window somewhere else, without following it yet."""
+    text = texts.WINDOW_SET.format(id=id_, frame=style.number(frame))
+    session.drag(lambda document: document.set_window(id_, frame, box, clip=Unread()), text)
+
+
+def feather_window(session: Session, id_: str, feather: float, *, dragging: bool = False) -> None:
+    """Let a pick's window fade out over so many pixels (`change`)."""
+    text = texts.FEATHER_SET.format(id=id_, pixels=style.number(feather))
+    do = session.drag if dragging else session.edit
+    do(lambda document: document.change_pick(id_, feather=feather), text)
+
+
+def remove_window(session: Session, id_: str) -> None:
+    """Let a pick change all of the picture again (`window`)."""
+    frame = session.frame
+    text = texts.WINDOW_REMOVED.format(id=id_)
+    session.edit(lambda document: document.set_window(id_, frame, None), text)
 
 
 def set_fades(session: Session, id_: str, before: float, after: float) -> None:

@@ -1,5 +1,6 @@
 """What the views draw in common: discs as in `palette4d plot`, and colours as displayed."""
 
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
@@ -114,6 +115,19 @@ def disc(
         painter.setPen(pen(style.INK, 0.9))
         painter.drawLine(QPointF(x - radius, y), QPointF(x + radius, y))
     ring(radius, rim, 1.7 if kind == "edited" else 1.0)
+
+
+def ring(
+    painter: QPainter, draw: Callable[[], object], *, thin: bool = False, dashed: bool = False
+) -> None:
+    """Draw a line that is seen on any picture: dark below bright."""
+    slim = 0.55 if thin or dashed else 1.0
+    for width, colour in ((4.2, QColor(0, 0, 0, 190)), (1.8, QColor(255, 255, 255, 255))):
+        pen = QPen(colour, width * slim)
+        if dashed and width < 2:
+            pen.setDashPattern([4, 3])
+        painter.setPen(pen)
+        draw()
 
 
 def padlock(painter: QPainter, x: float, y: float) -> None:

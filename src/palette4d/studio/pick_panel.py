@@ -26,6 +26,7 @@ from palette4d.plotting import style
 from palette4d.studio import grade_steps, paint, texts, theme
 from palette4d.studio.colour_widgets import Bar, Span
 from palette4d.studio.newest import Newest
+from palette4d.studio.pick_window import WindowRows
 from palette4d.studio.preview import taken_share
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
@@ -180,6 +181,7 @@ class PickPanel(QWidget):
         self.lightness.moved.connect(lambda span: self._moved("lightness", span))
         self.lightness.let_go.connect(self.session.drop)
         _add_row(grid, 2, texts.LIGHTNESS_TIP, label, self.lightness, self.lightness_words)
+        self.window_rows = WindowRows(self.session, grid, 3)
         grid.setColumnStretch(1, 1)
         return self.shape
 
@@ -196,6 +198,7 @@ class PickPanel(QWidget):
         self._silent = True
         try:
             self._show_shape(pick)
+            self.window_rows.refresh()
         finally:
             self._silent = False
         self._show_tool()

@@ -6,17 +6,14 @@ It knows no toolkit.
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.grade.clip_of_picks import main_colour
 from palette4d.grade.edits import as_colour
 from palette4d.studio import texts
-from palette4d.studio.preview import Grade, Preview
+from palette4d.studio.preview import Grade, Part, Preview
 from palette4d.studio.session import Session
 from palette4d.studio.states import Place, Probe
-
-F32 = NDArray[np.float32]
 
 #: The side of a cell of the clean-up, and how far from a pixel it sees
 #: (core/output/clean_up.cpp).
@@ -61,7 +58,10 @@ def probe_at(session: Session, x: int, y: int) -> Probe | None:
     if session.document is None:
         return Probe(x, y, source, source)
     grade = Grade.shown(session.document, session.view.after, session.frame)
-    around, row, column = _around(pixels, x, y)
+    part = _around(pixels.shape, x, y)
+    left, top, right, bottom = part
+    around, row, column = pixels[top:bottom, left:right], y - top, x - left
+    grade = grade.of_part(part, proxy_of(session))
     result = Preview.exact(around, grade, session.clip.premultiplied)[row, column]
     colour: Any = _core.straight_colours(pixel, premultiplied=session.clip.premultiplied)[0]
     if grade.conversion is not None:
@@ -73,13 +73,20 @@ def probe_at(session: Session, x: int, y: int) -> Probe | None:
     return Probe(x, y, source, tuple(float(v) for v in result), shares)
 
 
-def _around(pixels: F32, x: int, y: int) -> tuple[F32, int, int]:
-    """Return the part of a frame that decides a pixel's result, and its row and column there.
+def proxy_of(session: Session) -> tuple[float, float]:
+    """Return the pixels of the shown clip, across and down, for one of the palette's clip."""
+    document, clip = session.document, session.clip
+    if document is None or clip is None:
+        return 1.0, 1.0
+    own = document.grade.core.clip
+    return clip.width / own["width"], clip.height / own["height"]
+
+
+def _around(shape: tuple[int, ...], x: int, y: int) -> Part:
+    """Return the part of a frame that decides a pixel's result: left, top, right and bottom.
 
     The cells of the clean-up are counted from the lower left corner.
     """
-    height = len(pixels)
+    height, width = shape[:2]
     left, below = max(0, x - REACH) // CELL * CELL, max(0, height - 1 - y - REACH) // CELL * CELL
-    top = max(0, y - REACH)
-    part = pixels[top : height - below, left : x + REACH + 1]
-    return np.ascontiguousarray(part), y - top, x - left
+    return left, max(0, y - REACH), min(width, x + REACH + 1), height - below

@@ -30,6 +30,7 @@ from palette4d.studio.response import Responses
 
 F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]
+Part = tuple[int, int, int, int]
 
 #: Bytes of scaled frames, of pictures before the edits, and of pictures to play, that are kept.
 SMALL_BYTES, BEFORE_BYTES, REEL_BYTES = 80 << 20, 40 << 20, 320 << 20
@@ -74,9 +75,12 @@ class Grade:
         """Return the grade that "after" shows: that of a version, or the document's ("")."""
         return cls.of_version(document, version, frame) or cls.of(document, frame)
 
-    def of_part(self, region: Region) -> "Grade":
-        """Return the grade of a part of the picture: windows of picks lie elsewhere in it."""
-        return dataclasses.replace(self, picks=_of_part(self.picks, region))
+    def of_part(self, part: Part, proxy: tuple[float, float]) -> "Grade":
+        """Return the grade of a part of the picture: windows of picks lie elsewhere in it.
+
+        `part` is left, top, right and bottom; `proxy` is `pixels.proxy_of`.
+        """
+        return dataclasses.replace(self, picks=_of_part(self.picks, part, proxy))
 
     def recolourer(self) -> _core.Recolourer:
         """Return the exact recolouring."""
@@ -84,10 +88,13 @@ class Grade:
         return _core.Recolourer(palette.rgb, palette.edited, palette.faces, picks=self.picks)
 
 
-def _of_part(picks: _core.FramePicks | None, region: Region) -> _core.FramePicks | None:
+def _of_part(
+    picks: _core.FramePicks | None, part: Part, proxy: tuple[float, float]
+) -> _core.FramePicks | None:
     if picks is None or not any(picks.windows):
         return picks
-    return picks.of_part(region.part)
+    (x, y), (left, top, right, bottom) = proxy, part
+    return picks.of_part((left / x, top / y, right / x, bottom / y))
 
 
 @dataclass(frozen=True)
@@ -124,6 +131,8 @@ class Request:
         Mark colours outside of the palette.
     scaled : bool
         The pixels are the region's at its coarse size, not the frame's.
+    proxy : (float, float)
+        Pixels of the frame for one of the palette's clip (`pixels.proxy_of`).
     """
 
     clip: int
@@ -143,6 +152,7 @@ class Request:
     pick_matte: _core.FramePicks | None = None
     outside: bool = False
     scaled: bool = False
+    proxy: tuple[float, float] = (1.0, 1.0)
 
     @property
     def key(self) -> tuple[Any, ...] | None:
@@ -323,7 +333,7 @@ class Preview:
         matte = None
         if request.matte is not None and request.grade is not None and after is not None:
             source = self._source(request, exact)
-            picks = _of_part(request.pick_matte, request.region)
+            picks = _of_part(request.pick_matte, request.region.part, request.proxy)
             matte = matte_of(source, request.grade, request.matte, picks)
             if matte is not None:
                 shown = _highlighted if request.pick_matte is None else _singled_out
@@ -384,10 +394,12 @@ class Preview:
         """Return the region's colours with a grade."""
         if grade is None:
             return self._source(request, exact)
-        if exact and not request.region.whole:
+        cleaned = grade.picks is not None and grade.picks.count > 0  # pixels change those around
+        if exact and (cleaned or not request.region.whole):
             whole = self.exact(request.pixels, grade, request.premultiplied, check)
             return resampled(whole, request.region)
-        source, grade = self._source(request, exact), grade.of_part(request.region)
+        source = self._source(request, exact)
+        grade = grade.of_part(request.region.part, request.proxy)
         dragged = not (exact or request.settled or request.scaled)
         if dragged and grade.conversion is None and source.shape[2] == 3:
             return self._responses.picture(source, grade)

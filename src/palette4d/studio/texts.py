@@ -226,6 +226,12 @@ GESTURES = (
         "paint what belongs to it too; a click adds a box",
     ),
     ("picture", "Shift-wheel, with a pick selected", "the brush's size"),
+    (
+        "picture",
+        "drag an edge, a corner or the middle of a window",
+        "size or move it; Esc takes that back",
+    ),
+    ("picture", "drag the dashed line around a window", "how far it fades out"),
     ("picture", "move the pointer", "see the pixel's values, and its weights on the rows"),
     ("picture", "wheel", "zoom at the pointer"),
     (
@@ -540,12 +546,12 @@ PLACE_HINT = "choose what it becomes"
 PICK, HOLD = "pick", "hold"
 PICKED, PICK_SET = "the colour is picked", "{id} has a new colour"
 HELD = "the colour is held"
-LEARNING = "learning the colour…"
-STILL_FOLLOWING = "a colour is still being followed through the clip; try again when that is done"
-CLOSES_SOON = "the window closes when the colour is followed; close it again to leave it as it is"
+LEARNING = "reading the clip…"
+STILL_FOLLOWING = "an edit is still followed through the clip; try again when that is done"
+CLOSES_SOON = "Studio closes when the edit is followed; close it again to leave it as it is"
 NOT_FOLLOWED = "kept, but not followed through the clip: {why}"
 FOLLOWED = "followed: {step}"
-FOLLOWING = "following the colour: {done} of {total} frames"
+FOLLOWING = "following through the clip: {done} of {total} frames"
 PICK_LIST = "Picks, holds and locks"
 PICK_COLUMNS = ("name, kind, frame", "acts in")
 ALL_FRAMES = "all frames"
@@ -560,6 +566,20 @@ SOFTNESS_TIP = "How soft the edge of its matte is"
 LIGHTNESS_TIP = (
     "Only this range of lightness changes. Up and Down choose the end that the arrows move"
 )
+WINDOW = "Window"
+WINDOW_TIP = "It changes only what is in a box over the picture, which is followed through the clip"
+#: The numbers of a window, in pixels of the clip: their names, and what they are.
+WINDOW_NUMBERS = {
+    "x": ("X", "The window's left edge, in pixels from the picture's"),
+    "y": ("Y", "The window's top, in pixels from the picture's"),
+    "width": ("W", "The window's width in pixels"),
+    "height": ("H", "The window's height in pixels"),
+}
+FEATHER = "Feather"
+FEATHER_TIP = "Over how many pixels the change fades out beyond the window"
+WINDOW_SET = "window of {id} at frame {frame}"
+WINDOW_REMOVED = "{id} has no window: it changes all of the picture"
+FEATHER_SET = "window of {id}: a feather of {pixels} pixels"
 WHOLE_HUE = "All of its hue"
 WHOLE_HUE_TIP = "It takes every colour of its hue, like a hue qualifier"
 ITS_HUE, ITS_COLOURS = "{id} takes all of its hue", "{id} takes the colours of its place"

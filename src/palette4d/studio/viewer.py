@@ -20,13 +20,14 @@ from PySide6.QtWidgets import QWidget
 from palette4d.grade.picks import Area
 from palette4d.studio import texts
 from palette4d.studio.paint import image_of
-from palette4d.studio.pixels import place_between, probe_at
+from palette4d.studio.pixels import place_between, probe_at, proxy_of
 from palette4d.studio.player import Region
 from palette4d.studio.preview import NO_PIXELS, Grade, Picture, Preview, Request
 from palette4d.studio.session import Session
 from palette4d.studio.states import Place
 from palette4d.studio.viewer_cross import Cross
 from palette4d.studio.viewer_paint import ViewerPainter, hatched
+from palette4d.studio.viewer_window import WindowHandles
 
 #: Pixels of the screen within which the pointer takes the wipe's line, and a press is a click.
 NEAR_WIPE, CLICK = 6, 4
@@ -57,7 +58,7 @@ class Viewer(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setAccessibleName(texts.VIEWER)
-        self.cross = Cross(self)
+        self.cross, self.handles = Cross(self), WindowHandles(self)
         self.painter = ViewerPainter(self)
         self.preview = Preview(lambda picture: session.post(lambda: self._arrived(picture)))
         self.zoom: float | None = None  #: pixels of the screen for one of the frame; None: fitted
@@ -246,6 +247,7 @@ class Viewer(QWidget):
             against=self._before_key(),
             revision=revision,
             sides=frozenset(self.sides),
+            proxy=proxy_of(session),
             **more,
         )
 
@@ -390,13 +392,16 @@ class Viewer(QWidget):
     # ------------------------------------------------------------------------------------ gestures
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Begin a pan, a wipe, or a pick."""
+        """Begin a pan, a wipe, a drag of a window, or a pick."""
         self.press, point = event.position(), event.position()
         if event.button() == Qt.MouseButton.MiddleButton:
             self.doing, self._pan_from = "pan", QPointF(self._middle())
         elif event.button() == Qt.MouseButton.LeftButton:
             if self._over_wipe(point):
                 self.doing = "wipe"
+            elif (grip := self.handles.grip_at(point, event.modifiers())) is not None:
+                self.doing = "handle"
+                self.handles.press(point, grip)
             elif (at := self.pixel_at(point)) is not None and self.brushing(event.modifiers()):
                 self.doing, self.stroke = "stroke", [at]
                 self.update()
@@ -422,10 +427,14 @@ class Viewer(QWidget):
             self.session.look(wipe=min(max(at, 0.0), 1.0))
         elif self.doing == "stroke":
             self._draw_to(point)
-        elif self.doing in ("pick", "box") and self.press is not None:
+        elif self.doing == "window":
+            self.handles.drag_to(point)
+        elif self.doing in ("pick", "box", "handle") and self.press is not None:
             moved = point - self.press
             if max(abs(moved.x()), abs(moved.y())) > CLICK:
-                self.doing = "box"
+                self.doing = "window" if self.doing == "handle" else "box"
+            if self.doing == "window":
+                self.handles.drag_to(point)
             self.update()
         else:
             before, self.shows_brush = self.shows_brush, self.brushing(event.modifiers())
@@ -433,11 +442,13 @@ class Viewer(QWidget):
                 self.update()
             over = self._over_wipe(point)
             shape = Qt.CursorShape.SplitHCursor if over else Qt.CursorShape.CrossCursor
-            self.setCursor(shape if self.pixel_at(point) or over else Qt.CursorShape.ArrowCursor)
+            shape = shape if self.pixel_at(point) or over else Qt.CursorShape.ArrowCursor
+            handle = None if over else self.handles.shape_at(point, event.modifiers())
+            self.setCursor(shape if handle is None else handle)
         self._probe(point)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        """End a pan; make a pick or a hold."""
+        """End a pan or a drag of a window; make a pick or a hold."""
         doing, press, self.doing, self.press = self.doing, self.press, "", None
         if doing == "pan":
             self.refresh()
@@ -446,7 +457,9 @@ class Viewer(QWidget):
             drawn = tuple((float(x), float(y)) for x, y in points)
             if self.on_area is not None:
                 self.on_area(Area(self.session.frame, drawn, self.stroke_radius))
-        if doing in ("pick", "box") and press is not None:
+        if doing == "window":
+            self.handles.let_go()
+        if doing in ("pick", "box", "handle") and press is not None:
             hold = event.modifiers() & HOLD_KEYS or self.session.tool == "hold"
             self._click(press, event.position() if doing == "box" else press, hold=bool(hold))
         self.update()

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,8 @@ from PySide6.QtGui import (
 )
 
 from palette4d.grade.picks import Pick
-from palette4d.studio import texts, theme
+from palette4d.studio import paint, texts, theme
 from palette4d.studio.drafts import DRAFT
-from palette4d.studio.paint import image_of
 from palette4d.studio.preview import MATTE_GREY, REST_LIFT, REST_LIGHT
 from palette4d.studio.row_names import row_name
 from palette4d.studio.screen_colours import on_screen
@@ -72,6 +71,7 @@ class ViewerPainter:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         self._draw_captions(painter)
         self._draw_marks(painter)
+        self.viewer.handles.paint(painter)
         self._draw_brush(painter)
         self.viewer.cross.paint(painter)
         if (
@@ -81,7 +81,7 @@ class ViewerPainter:
         ):
             painter.setBrush(Qt.BrushStyle.NoBrush)
             frame = QRectF(self.viewer.press, self.viewer.pointer).normalized()
-            _ring(painter, lambda: painter.drawRect(frame))
+            paint.ring(painter, lambda: painter.drawRect(frame))
         self._draw_probe(painter)
         self._draw_legend(painter)
         if self.viewer.late:
@@ -202,7 +202,7 @@ class ViewerPainter:
         if at is not None and (viewer.shows_brush or viewer.stroke):
             painter.setBrush(Qt.BrushStyle.NoBrush)
             radius = viewer.stroke_radius * viewer.scale()
-            _ring(painter, lambda: painter.drawEllipse(at, radius, radius), thin=True)
+            paint.ring(painter, lambda: painter.drawEllipse(at, radius, radius), thin=True)
 
     def _stroke(
         self, painter: QPainter, points: Sequence[tuple[float, float]], radius: float, alpha: int
@@ -225,7 +225,7 @@ class ViewerPainter:
             shape = stroker.createStroke(middle).simplified()
         painter.fillPath(shape, QColor(255, 255, 255, alpha))
         painter.setBrush(Qt.BrushStyle.NoBrush)
-        _ring(painter, lambda: painter.drawPath(shape), thin=True)
+        paint.ring(painter, lambda: painter.drawPath(shape), thin=True)
 
     def _mark(
         self,
@@ -244,14 +244,14 @@ class ViewerPainter:
         box = QRectF(point.x() - half, point.y() - half, 2 * half, 2 * half)
         painter.setBrush(Qt.BrushStyle.NoBrush)
         draw = painter.drawRect if hold else painter.drawEllipse
-        _ring(painter, lambda: draw(box), dashed=dashed)
+        paint.ring(painter, lambda: draw(box), dashed=dashed)
         if hold and not dashed:
-            _ring(painter, lambda: painter.drawPoint(point))
+            paint.ring(painter, lambda: painter.drawPoint(point))
         if cross:
             for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
                 start = point + QPointF(dx, dy) * (half + 2)
                 end = point + QPointF(dx, dy) * (half + 9)
-                _ring(painter, functools.partial(painter.drawLine, start, end))
+                paint.ring(painter, functools.partial(painter.drawLine, start, end))
         return box
 
     def _draw_probe(self, painter: QPainter) -> None:
@@ -377,22 +377,11 @@ def hatched(mask: NDArray[np.uint8]) -> QImage:
     overlay = np.zeros((*mask.shape, 4), np.uint8)
     overlay[..., 3] = np.where(mask > 0, 190, 0)
     overlay[..., :3] = np.where((mask > 0) & stripes, 190, 0)[..., None]  # premultiplied white
-    return image_of(overlay, QImage.Format.Format_RGBA8888_Premultiplied)
+    return paint.image_of(overlay, QImage.Format.Format_RGBA8888_Premultiplied)
 
 
 def _figure(value: float) -> str:
     return f"{value:7.4f}" if abs(value) < 100 else f"{value:7.1f}"
-
-
-def _ring(painter: QPainter, draw: Any, *, thin: bool = False, dashed: bool = False) -> None:
-    """Draw a line that is seen on any picture: dark below bright."""
-    slim = 0.55 if thin or dashed else 1.0
-    for width, colour in ((4.2, QColor(0, 0, 0, 190)), (1.8, QColor(255, 255, 255, 255))):
-        pen = QPen(colour, width * slim)
-        if dashed and width < 2:
-            pen.setDashPattern([4, 3])
-        painter.setPen(pen)
-        draw()
 
 
 def _flag(

@@ -1,0 +1,171 @@
+"""The window of the selected pick as numbers: on or off, where it is, and its feather."""
+
+import numpy as np
+from PySide6.QtCore import QObject, QTimer
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDoubleSpinBox,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+)
+
+from palette4d.grade.picks import MOST_PIXELS, Box, Pick, Window
+from palette4d.studio import grade_steps, texts
+from palette4d.studio.colour_widgets import Bar
+from palette4d.studio.session import Session
+
+#: The width of a number, and of that beside the bar, which is as those of the panel.
+NUMBER, BESIDE = 54, 72
+#: A typed box is followed through the clip when no number has changed for so many milliseconds.
+REST = 600
+#: Greys of the feather's bar.
+GREYS = np.repeat(np.linspace(40, 200, 24).astype(np.uint8)[:, None], 3, axis=1)
+
+
+class WindowRows(QObject):
+    """The rows of a pick's panel for its window.
+
+    Parameters
+    ----------
+    session : Session
+    grid : QGridLayout
+        The panel's rows: a name, a bar, a number.
+    line : int
+        The first row that is free.
+    """
+
+    def __init__(self, session: Session, grid: QGridLayout, line: int) -> None:
+        super().__init__()
+        self.session = session
+        self._silent = False
+        self._typed: tuple[str, float, Box] | None = None  # a box that is not followed yet
+        self._resting = QTimer(self)
+        self._resting.setSingleShot(True)
+        self._resting.timeout.connect(self._keep)
+        self.on = QCheckBox(texts.WINDOW)
+        self.on.setToolTip(texts.WINDOW_TIP)
+        self.on.clicked.connect(self._switched)
+        grid.addLayout(self._make_numbers(), line, 0, 1, 3)
+        self.label, self.bar, self.feather = QLabel(texts.FEATHER), Bar(texts.FEATHER, 1.0), _box(0)
+        self.feather.setAccessibleName(texts.FEATHER)
+        self.feather.setFixedWidth(BESIDE)
+        self.feather.valueChanged.connect(self._feather_typed)
+        self.bar.moved.connect(self._feather_moved)
+        self.bar.let_go.connect(session.drop)
+        self.label.setBuddy(self.feather)
+        for place, part in enumerate((self.label, self.bar, self.feather)):
+            part.setToolTip(texts.FEATHER_TIP)
+            grid.addWidget(part, line + 1, place)
+        session.on("frame", self.refresh, panel=True)
+
+    def _make_numbers(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        row.setSpacing(3)
+        row.addWidget(self.on)
+        row.addStretch(1)
+        self.numbers: dict[str, QDoubleSpinBox] = {}
+        self._names = []
+        for name, (short, what) in texts.WINDOW_NUMBERS.items():
+            label, box = QLabel(short), _box(1 if name in ("width", "height") else -MOST_PIXELS)
+            box.setAccessibleName(what)
+            box.setDecimals(0)
+            box.setFixedWidth(NUMBER)
+            box.valueChanged.connect(lambda value, name=name: self._number_typed(name, value))
+            label.setBuddy(box)
+            for part in (label, box):
+                part.setToolTip(what)
+                row.addWidget(part)
+            self.numbers[name] = box
+            self._names.append(label)
+        return row
+
+    def refresh(self) -> None:
+        """Show the window of the selected pick at the playhead."""
+        pick = self.session.picked
+        if pick is None:
+            return
+        window = pick.window
+        parts = (*self._names, *self.numbers.values(), self.label, self.bar, self.feather)
+        for part in parts:
+            part.setVisible(window is not None)
+        self._silent = True
+        try:
+            self.on.setChecked(window is not None)
+            if window is None:
+                return
+            for name, value in self._numbers_of(window).items():
+                _show(self.numbers[name], value)
+            _show(self.feather, window.feather)
+            self.bar.show_value(window.feather, 0.0, 0.0, self._most(), GREYS)
+        finally:
+            self._silent = False
+
+    def _numbers_of(self, window: Window) -> dict[str, float]:
+        """Return the numbers of a window at the playhead."""
+        left, top, right, bottom = window.box_at(self.session.frame).tolist()
+        return {"x": left, "y": top, "width": right - left, "height": bottom - top}
+
+    def _most(self) -> float:
+        """Return the largest feather of the bar: the frame's smaller side."""
+        document = self.session.document
+        clip = {"width": 1, "height": 1} if document is None else document.grade.core.clip
+        return float(min(clip["width"], clip["height"]))
+
+    # --------------------------------------------------------------------------------- what it does
+
+    def _picked(self) -> Pick | None:
+        """Return the selected pick, unless numbers are being shown."""
+        return None if self._silent else self.session.picked
+
+    def _switched(self, on: bool) -> None:
+        pick = self._picked()
+        if pick is None:
+            return
+        if on:
+            grade_steps.set_window(
+                self.session, pick.id, *grade_steps.first_box(self.session, pick)
+            )
+        else:
+            grade_steps.remove_window(self.session, pick.id)
+
+    def _feather_moved(self, value: float) -> None:
+        pick = self._picked()
+        if pick is not None:
+            soft = max(0.0, float(round(value)))
+            grade_steps.feather_window(self.session, pick.id, soft, dragging=True)
+
+    def _feather_typed(self, value: float) -> None:
+        pick = self._picked()
+        if pick is not None:
+            grade_steps.feather_window(self.session, pick.id, value)
+
+    def _number_typed(self, name: str, value: float) -> None:
+        """Show the window there, and follow it when no other number comes."""
+        pick = self._picked()
+        if pick is None or pick.window is None:
+            return
+        x, y, width, height = {**self._numbers_of(pick.window), name: value}.values()
+        self._typed = pick.id, self.session.frame, (x, y, x + width, y + height)
+        grade_steps.drag_window(self.session, *self._typed)
+        self._resting.start(REST)
+
+    def _keep(self) -> None:
+        typed, self._typed = self._typed, None
+        if typed is not None and self.session.dragging:
+            grade_steps.set_window(self.session, *typed)
+
+
+def _box(least: float) -> QDoubleSpinBox:
+    """Return a field for a number of pixels."""
+    box = QDoubleSpinBox()
+    box.setDecimals(1)
+    box.setRange(least, MOST_PIXELS)
+    box.setKeyboardTracking(False)
+    return box
+
+
+def _show(box: QDoubleSpinBox, value: float) -> None:
+    """Show a number, unless another one is being typed."""
+    if not box.lineEdit().hasFocus() or not box.lineEdit().isModified():
+        box.setValue(value)

@@ -1,0 +1,180 @@
+"""The window of a pick in its panel: on and off, its numbers, and its feather."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from windows import FRAME, Settle
+
+from palette4d.grade.picks import Area
+from palette4d.grade.picks import Window as PickWindow
+from palette4d.studio.pick_window import REST, WindowRows
+from palette4d.studio.window import Window
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def rows(opened: Window, settle: Settle, qtbot: Any) -> Iterator[WindowRows]:
+    """The rows of a pick that is selected, in a window of 160x90 pixels."""
+    session = opened.session
+    assert session.clip is not None
+    clip = session.clip.source
+    session.edit(lambda d: d.pick(FRAME, pixel=(40, 30), to=(0.9, 0.1, 0.5), clip=clip))
+    session.select("p1")
+    settle(opened)
+    yield opened.inspector.panel.window_rows
+    qtbot.waitUntil(lambda: not session.following, timeout=60_000)
+
+
+def window_of(rows: WindowRows, id_: str = "p1") -> PickWindow | None:
+    assert rows.session.document is not None
+    return rows.session.document.grade.pick(id_).window
+
+
+def box_of(rows: WindowRows) -> list[float]:
+    """The box at the playhead."""
+    own = window_of(rows)
+    assert own is not None
+    return own.box_at(rows.session.frame).tolist()
+
+
+def steps(rows: WindowRows) -> int:
+    assert rows.session.document is not None
+    return len(rows.session.document.history.done)
+
+
+def switch(rows: WindowRows) -> None:
+    QTest.mouseClick(rows.on, LEFT, pos=QPoint(6, rows.on.height() // 2))
+
+
+def numbers(rows: WindowRows) -> list[float]:
+    return [box.value() for box in rows.numbers.values()]
+
+
+def test_it_is_switched_on_around_the_place_and_off(rows: WindowRows) -> None:
+    before = steps(rows)
+    assert window_of(rows) is None
+    assert not rows.on.isChecked()
+    assert not rows.bar.isVisibleTo(rows.on.window())
+    switch(rows)
+    left, top, right, bottom = box_of(rows)
+    assert (right - left, bottom - top) == pytest.approx((90 / 4, 90 / 4), abs=1)
+    assert ((left + right) / 2, (top + bottom) / 2) == pytest.approx((40.5, 30.5), abs=1)
+    own = window_of(rows)
+    assert own is not None
+    assert own.feather > 0
+    assert [key.frame for key in own.keys if key.given] == [FRAME]
+    assert rows.on.isChecked()
+    assert rows.bar.isVisibleTo(rows.on.window())
+    assert numbers(rows) == [left, top, right - left, bottom - top]
+    assert steps(rows) == before + 1
+    switch(rows)
+    assert window_of(rows) is None
+    assert not rows.on.isChecked()
+    rows.session.undo()
+    assert box_of(rows) == [left, top, right, bottom]
+
+
+def test_it_begins_with_room_around_what_was_marked(rows: WindowRows) -> None:
+    rows.session.edit(lambda d: d.change_pick("p1", areas=(Area(FRAME, ((40, 30), (100, 50)), 5),)))
+    switch(rows)
+    left, top, right, bottom = box_of(rows)
+    assert left < 35 < 105 < right < 130
+    assert top < 25 < 55 < bottom < 80
+
+
+def test_of_a_colour_without_a_place_it_begins_in_the_middle_of_this_frame(
+    rows: WindowRows,
+) -> None:
+    session = rows.session
+    session.edit(lambda d: d.pick(2, colour=(0.5, 0.4, 0.3), to=(0.9, 0.1, 0.5), follow=False))
+    session.select("p2")
+    switch(rows)
+    own = window_of(rows, "p2")
+    assert own is not None
+    left, top, right, bottom = own.box_at(FRAME)
+    assert ((left + right) / 2, (top + bottom) / 2) == pytest.approx((80, 45), abs=1)
+    assert FRAME in [key.frame for key in own.keys if key.given]
+
+
+def test_the_feather_is_dragged_and_typed(rows: WindowRows, qtbot: Any) -> None:
+    switch(rows)
+    before, middle = steps(rows), rows.bar.height() // 2
+    QTest.mousePress(rows.bar, LEFT, pos=QPoint(rows.bar.width() // 4, middle))
+    QTest.mouseMove(rows.bar, QPoint(rows.bar.width() // 2, middle))
+    own = window_of(rows)
+    assert own is not None
+    assert rows.session.dragging
+    assert own.feather == pytest.approx(45, abs=1)  # half of the frame's smaller side
+    qtbot.waitUntil(lambda: rows.feather.value() == own.feather)
+    QTest.mouseRelease(rows.bar, LEFT, pos=QPoint(rows.bar.width() // 2, middle))
+    assert not rows.session.dragging
+    assert steps(rows) == before + 1
+    rows.feather.setFocus()
+    rows.feather.selectAll()
+    QTest.keyClicks(rows.feather, "200.5")  # more than the bar has
+    QTest.keyClick(rows.feather, Qt.Key.Key_Return)
+    own = window_of(rows)
+    assert own is not None
+    assert own.feather == 200.5
+    assert steps(rows) == before + 2
+    QTest.keyClick(rows.bar, Qt.Key.Key_Left)
+    assert steps(rows) == before + 3
+
+
+def test_numbers_are_typed_as_one_step(rows: WindowRows, qtbot: Any) -> None:
+    switch(rows)
+    before = steps(rows)
+    left, top, right, bottom = box_of(rows)
+    for name, text in (("x", "-7"), ("width", "50")):
+        box = rows.numbers[name]
+        box.setFocus()
+        box.selectAll()
+        QTest.keyClicks(box, text)
+        QTest.keyClick(box, Qt.Key.Key_Return)
+    assert box_of(rows) == [-7, top, 43, bottom]
+    assert rows.session.dragging
+    qtbot.waitUntil(lambda: not rows.session.dragging, timeout=10 * REST)
+    assert box_of(rows) == [-7, top, 43, bottom]
+    assert steps(rows) == before + 1
+    box = rows.numbers["height"]
+    QTest.keyClick(box, Qt.Key.Key_Up)  # the arrow's step, and then Esc
+    assert box_of(rows) == [-7, top, 43, bottom + 1]
+    QTest.keyClick(box, Qt.Key.Key_Escape)
+    assert box_of(rows) == [-7, top, 43, bottom]
+    qtbot.wait(2 * REST)
+    assert steps(rows) == before + 1
+    assert rows.numbers["height"].value() == bottom - top
+    rows.session.undo()
+    assert box_of(rows) == [left, top, right, bottom]
+
+
+def test_the_numbers_are_those_of_the_playhead(rows: WindowRows, settle: Settle) -> None:
+    session = rows.session
+    session.edit(lambda d: d.set_window("p1", 2, (10, 20, 30, 50)))
+    session.edit(lambda d: d.set_window("p1", 10, (50, 20, 90, 60)))
+    for frame, wanted in ((2, [10, 20, 20, 30]), (10, [50, 20, 40, 40]), (6, [30, 20, 30, 35])):
+        session.go(frame)
+        settle(rows.on.window())
+        np.testing.assert_allclose(numbers(rows), wanted, atol=0.5)
+
+
+def test_a_hold_has_none(rows: WindowRows) -> None:
+    rows.session.edit(lambda d: d.hold(FRAME, colour=(0.2, 0.5, 0.2), follow=False))
+    rows.session.select("p2")
+    assert not rows.on.isVisibleTo(rows.on.window())
+    rows.session.select("p1")
+    assert rows.on.isVisibleTo(rows.on.window())
+
+
+def test_screen_readers_know_its_fields(rows: WindowRows) -> None:
+    names = [box.accessibleName() for box in (*rows.numbers.values(), rows.feather, rows.bar)]
+    assert all(names)
+    assert len({*names}) == 5  # the bar and its number are the same thing
+    assert all(part.toolTip() for part in (rows.on, *rows.numbers.values(), rows.feather))
