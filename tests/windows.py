@@ -30,7 +30,12 @@ def busiest(window: Window) -> str:
 
 def seen(window: Window) -> Any:
     """What the viewer draws, (h, w, 3) of 8 bits."""
-    image = window.viewer.grab().toImage()
+    return pixels_of(window.viewer)
+
+
+def pixels_of(widget: QWidget) -> Any:
+    """What a widget draws, (h, w, 3) of 8 bits."""
+    image = widget.grab().toImage()
     image = image.convertToFormat(image.Format.Format_RGB888)
     rows = np.array(np.frombuffer(image.constBits(), np.uint8)).reshape(image.height(), -1)
     return rows[:, : 3 * image.width()].reshape(image.height(), image.width(), 3)

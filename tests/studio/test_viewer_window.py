@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtTest import QTest
-from windows import FRAME, Settle, seen, send
+from windows import FRAME, Settle, pixels_of, seen, send
 
 import palette4d
 from palette4d.cli.main import main
@@ -205,12 +205,24 @@ def test_at_another_frame_a_drag_gives_a_key_there(boxed: Window, settle: Settle
     left, top, right, bottom = box_of(boxed)
     drag(boxed, at(boxed, (left + right) / 2, (top + bottom) / 2), at(boxed, 90, 50))
     assert given(boxed) == [FRAME, 9]
+    assert not np.array_equal(lane_at(boxed, 9), lane_at(boxed, 8))  # it is on the pick's bar
+    assert np.array_equal(lane_at(boxed, 8), lane_at(boxed, 4))
     moved = box_of(boxed)
     assert ((moved[0] + moved[2]) / 2, (moved[1] + moved[3]) / 2) == pytest.approx((90, 50), abs=1)
     session.go(FRAME)
     assert box_of(boxed) == BOX
     session.undo()
     assert given(boxed) == [FRAME]
+
+
+def lane_at(window: Window, frame: float) -> Any:
+    """What the timeline draws of the pick's bar at a frame, without the playhead."""
+    window.session.go(1)
+    timeline = window.timeline
+    y, x = round(timeline.places.lane_y(0)), round(timeline.places.x_of(frame))
+    rows = pixels_of(timeline)[y - 4 : y + 5, x - 4 : x + 5]
+    window.session.go(9)
+    return rows
 
 
 def test_the_dashed_line_is_dragged_for_the_feather(boxed: Window) -> None:

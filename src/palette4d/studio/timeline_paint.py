@@ -18,6 +18,7 @@ from palette4d.studio import paint, texts, theme
 from palette4d.studio.frame_strip import FrameStrip
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
+from palette4d.studio.timeline_lanes import paint_lanes
 from palette4d.studio.timeline_places import FOOT, GUTTER, RULER, SIDE, STRIP, TAIL, Places
 
 F64 = NDArray[np.float64]
@@ -71,7 +72,7 @@ class TimelinePainter:
             bands, discs = self._pictures()
             painter.drawPixmap(0, 0, bands)
             self.strip.paint(painter)
-            self._paint_lanes(painter)
+            paint_lanes(painter, self.session, self.places)
             self._paint_playhead(painter)
             painter.drawPixmap(0, 0, discs)
             self._paint_pointer(painter)
@@ -290,50 +291,6 @@ class TimelinePainter:
             painter.setPen(paint.pen(style.GUIDE, 0.8))
             painter.drawLine(QPointF(x, RULER - 4), QPointF(x, RULER))
             paint.label(painter, x, RULER / 2 - 1, style.number(tick), style.TEXT)
-        painter.restore()
-
-    def _paint_lanes(self, painter: QPainter) -> None:
-        """Draw the ranges of picks and holds: the fades as wedges, the frame as a diamond."""
-        picks = self.places.lanes()
-        if not picks:
-            return
-        painter.save()
-        painter.setClipRect(
-            QRectF(GUTTER, RULER + STRIP, self.places.width - GUTTER, self.places.upper)
-        )
-        for pick, lane in picks:
-            y, half = self.places.lane_y(lane), self.places.lane_height / 2 - 1
-            begin, start, until, end = (self.places.x_of(t) for t in self.places.reach(pick))
-            start, until = max(start, begin + 0.5), max(until, start + 1)
-            shape = np.array(
-                [
-                    (begin, y),
-                    (start, y - half),
-                    (until, y - half),
-                    (end, y),
-                    (until, y + half),
-                    (start, y + half),
-                ]
-            )
-            chosen = pick.id in self.session.selection
-            rim = paint.pen(style.BRIGHT if chosen else style.RING, 1.8 if chosen else 0.9)
-            colour = on_screen(self.session, pick.rgb if pick.to is None else pick.to)
-            painter.setBrush(paint.colour_of(colour))
-            if not pick.enabled:
-                rim.setDashPattern([3, 3])
-                painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.setPen(rim)
-            painter.drawPolygon(paint.polygon(shape))
-            if pick.kind == "hold":  # a hold has a bar along it
-                for grey, width in ((style.INK, 3.4), (style.BRIGHT, 1.4)):
-                    painter.setPen(paint.pen(grey, width))
-                    painter.drawLine(QPointF(start + 4, y), QPointF(until - 4, y))
-            x = self.places.x_of(pick.frame)
-            wide = min(5.0, half + 1)
-            diamond = np.array([(x - wide, y), (x, y - wide), (x + wide, y), (x, y + wide)])
-            painter.setPen(paint.pen(style.INK, 1.2))
-            painter.setBrush(QColor(style.BRIGHT))
-            painter.drawPolygon(paint.polygon(diamond))
         painter.restore()
 
     def _paint_gutter(self, painter: QPainter) -> None:
