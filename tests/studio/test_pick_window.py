@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from typing import Any
 
@@ -11,7 +12,8 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from windows import FRAME, Settle
 
-from palette4d.grade.picks import Area
+from palette4d.grade.document import Document
+from palette4d.grade.picks import Area, WindowKey
 from palette4d.grade.picks import Window as PickWindow
 from palette4d.studio.pick_window import REST, WindowRows
 from palette4d.studio.window import Window
@@ -41,7 +43,7 @@ def box_of(rows: WindowRows) -> list[float]:
     """The box at the playhead."""
     own = window_of(rows)
     assert own is not None
-    return own.box_at(rows.session.frame).tolist()
+    return [float(side) for side in own.box_at(rows.session.frame)]
 
 
 def steps(rows: WindowRows) -> int:
@@ -155,14 +157,32 @@ def test_numbers_are_typed_as_one_step(rows: WindowRows, qtbot: Any) -> None:
     assert box_of(rows) == [left, top, right, bottom]
 
 
-def test_the_numbers_are_those_of_the_playhead(rows: WindowRows, settle: Settle) -> None:
+def test_the_numbers_are_those_of_the_playhead(
+    rows: WindowRows, opened: Window, settle: Settle
+) -> None:
     session = rows.session
     session.edit(lambda d: d.set_window("p1", 2, (10, 20, 30, 50)))
     session.edit(lambda d: d.set_window("p1", 10, (50, 20, 90, 60)))
     for frame, wanted in ((2, [10, 20, 20, 30]), (10, [50, 20, 40, 40]), (6, [30, 20, 30, 35])):
         session.go(frame)
-        settle(rows.on.window())
+        settle(opened)
         np.testing.assert_allclose(numbers(rows), wanted, atol=0.5)
+
+
+def place(window: PickWindow, document: Document) -> None:
+    document.change_pick("p1", window=window)
+
+
+def test_it_says_where_it_is_lost(rows: WindowRows) -> None:
+    session, box, window = rows.session, (20.0, 10.0, 60.0, 50.0), rows.on.window()
+    for first, last, words in ((1, 12, []), (3, 12, ["until frame 3"]), (1, 9, ["from frame 9"])):
+        keys = WindowKey(first, box), WindowKey(FRAME, box, given=True), WindowKey(last, box)
+        own = PickWindow(12.0, keys)
+        session.edit(functools.partial(place, own))
+        assert rows.lost.isVisibleTo(window) == bool(words)
+        assert all(each in rows.lost.text() for each in words)
+    session.edit(lambda d: d.change_pick("p1", until=8.0))  # not where it does not act
+    assert not rows.lost.isVisibleTo(window)
 
 
 def test_a_hold_has_none(rows: WindowRows) -> None:

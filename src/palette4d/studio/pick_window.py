@@ -1,7 +1,7 @@
 """The window of the selected pick as numbers: on or off, where it is, and its feather."""
 
 import numpy as np
-from PySide6.QtCore import QObject, QTimer
+from PySide6.QtCore import QObject, Qt, QTimer
 from PySide6.QtWidgets import (
     QCheckBox,
     QDoubleSpinBox,
@@ -11,7 +11,8 @@ from PySide6.QtWidgets import (
 )
 
 from palette4d.grade.picks import MOST_PIXELS, Box, Pick, Window
-from palette4d.studio import grade_steps, texts
+from palette4d.plotting import style
+from palette4d.studio import grade_steps, texts, theme
 from palette4d.studio.colour_widgets import Bar
 from palette4d.studio.session import Session
 
@@ -57,6 +58,11 @@ class WindowRows(QObject):
         for place, part in enumerate((self.label, self.bar, self.feather)):
             part.setToolTip(texts.FEATHER_TIP)
             grid.addWidget(part, line + 1, place)
+        self.lost = QLabel()
+        self.lost.setTextFormat(Qt.TextFormat.PlainText)
+        self.lost.setWordWrap(True)
+        self.lost.setStyleSheet(f"color: {theme.WARNING}")
+        grid.addWidget(self.lost, line + 2, 0, 1, 3)
         session.on("frame", self.refresh, panel=True)
 
     def _make_numbers(self) -> QHBoxLayout:
@@ -85,7 +91,15 @@ class WindowRows(QObject):
         pick = self.session.picked
         if pick is None:
             return
-        window = pick.window
+        window, document = pick.window, self.session.document
+        lost = (None, None) if document is None else pick.lost(document.grade.frames)
+        told = [
+            text.format(frame=style.number(frame))
+            for text, frame in zip(texts.WINDOW_LOST, lost, strict=True)
+            if frame is not None
+        ]
+        self.lost.setText("\n".join(told))
+        self.lost.setVisible(bool(told))
         parts = (*self._names, *self.numbers.values(), self.label, self.bar, self.feather)
         for part in parts:
             part.setVisible(window is not None)

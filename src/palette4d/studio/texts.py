@@ -577,6 +577,10 @@ WINDOW_NUMBERS = {
 }
 FEATHER = "Feather"
 FEATHER_TIP = "Over how many pixels the change fades out beyond the window"
+WINDOW_LOST = (
+    "What is in the window is lost until frame {frame}. Go there and drag the window onto it.",
+    "What is in the window is lost from frame {frame} on. Go there and drag the window onto it.",
+)
 WINDOW_SET = "window of {id} at frame {frame}"
 WINDOW_REMOVED = "{id} has no window: it changes all of the picture"
 FEATHER_SET = "window of {id}: a feather of {pixels} pixels"
