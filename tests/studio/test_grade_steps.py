@@ -244,6 +244,34 @@ def rows(hand: Hand) -> Iterator[Row]:
             *("--box", round(2 * hand.pick_of("p1").areas[1].radius)),
         ],
     )
+    on, bar = panel.window_rows.on, panel.window_rows.bar
+
+    def box_of() -> tuple[float, ...]:
+        own = hand.pick_of("p1").window
+        assert own is not None
+        return tuple(own.box_at(FRAME).tolist())
+
+    def boxed() -> list[object]:
+        return ["window", "p1", "--frame", FRAME, "--box", ",".join(map(repr, box_of()))]
+
+    def feathered() -> list[object]:
+        own = hand.pick_of("p1").window
+        assert own is not None
+        return ["window", "p1", "--feather", own.feather]
+
+    def move_window() -> None:
+        left, top, right, bottom = box_of()
+        middle = viewer.point_of((left + right) / 2, (top + bottom) / 2)
+        drag(viewer, middle, middle + QPointF(40, 60))
+
+    yield "a window", lambda: QTest.mouseClick(on, LEFT, pos=QPoint(6, 6)), boxed
+    yield "drag the window", move_window, boxed
+    yield "the feather", lambda: drag(bar, QPointF(20, 8), QPointF(60, 8)), feathered
+    yield (
+        "no window",
+        lambda: QTest.mouseClick(on, LEFT, pos=QPoint(6, 6)),
+        lambda: ["window", "p1", "--frame", FRAME, "--none"],
+    )
     yield (
         "menu: the same colour",
         menu(texts.SAME_COLOUR),
