@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from windows import FRAME, Settle
+from windows import FRAME, Settle, seen
 
+from palette4d.grade.answer import Answer, Note
 from palette4d.grade.document import Document
 from palette4d.grade.picks import Area, WindowKey
 from palette4d.grade.picks import Window as PickWindow
+from palette4d.studio import texts
 from palette4d.studio.pick_window import REST, WindowRows
 from palette4d.studio.window import Window
 
@@ -167,6 +169,24 @@ def test_the_numbers_are_those_of_the_playhead(
         session.go(frame)
         settle(opened)
         np.testing.assert_allclose(numbers(rows), wanted, atol=0.5)
+
+
+def test_a_window_that_the_answer_proposes_is_seen_and_added(
+    rows: WindowRows, opened: Window, settle: Settle
+) -> None:
+    settle(opened)
+    panel, before = opened.inspector.panel, seen(opened)
+    note = Note("a window helps", None, "window", "then takes 2 %", "p1", window=(70, 10, 120, 60))
+    panel._warned = ()
+    rows.session.show_answer(Answer(FRAME, 0.2, (note,)))
+    line = panel.notes[0]
+    assert line.button.text() == texts.ADD_GESTURE["window"]
+    assert "2 %" in line.button.toolTip()
+    edge = opened.viewer.point_of(120, 35).toPoint()
+    part = slice(edge.y() - 20, edge.y() + 20), slice(edge.x() - 4, edge.x() + 5)
+    assert (seen(opened)[part] != before[part]).any()
+    QTest.mouseClick(line.button, LEFT)
+    assert box_of(rows) == [70, 10, 120, 60]
 
 
 def place(window: PickWindow, document: Document) -> None:

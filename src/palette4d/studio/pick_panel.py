@@ -248,8 +248,12 @@ class PickPanel(QWidget):
     def _do(self, k: int) -> None:
         """Do what a note of the answer proposes."""
         found = self.session.answer
-        note = None if found is None else found.notes[k]
-        if note is None or note.place is None:
+        if found is None:
+            return
+        note = found.notes[k]
+        if note.window is not None:
+            grade_steps.set_window(self.session, note.id, found.frame, note.window)
+        if note.place is None:
             return
         at = note.place
         if note.gesture == "hold":
@@ -356,7 +360,7 @@ class PickPanel(QWidget):
                 )
                 line.button.setEnabled(True)
                 line.button.setVisible(bool(note.gesture))
-                line.button.setText(texts.ADD_HOLD if note.gesture == "hold" else texts.ADD_BOX)
+                line.button.setText(texts.ADD_GESTURE.get(note.gesture, ""))
                 line.button.setToolTip(note.effect)
         self.warning.say("\n".join(told))
 

@@ -187,6 +187,10 @@ class ViewerPainter:
                 self._stroke(painter, area.points, area.radius, 70)
         for note in () if found is None else found.notes:
             place = note.place
+            if found is not None and note.window is not None and found.frame == session.frame:
+                corner = self.viewer.handles.paint_proposed(painter, note.window)
+                none = np.zeros((0, 3), np.uint8)
+                _flag(painter, corner, texts.PROPOSED_WINDOW, none, bright=False)
             if place is None or place.frame != session.frame:
                 continue
             box = self._mark(painter, *place.pixel, place.box, hold=True, dashed=True)

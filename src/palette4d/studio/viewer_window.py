@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QPainter
 
 from palette4d.grade.picks import Box, Pick
@@ -82,13 +82,16 @@ class WindowHandles:
         box, pick = self.box(), self.pick
         if box is None or pick is None or pick.window is None:
             return None
-        (x, y), scale, soft = proxy_of(self.session), self.viewer.scale(), pick.window.feather
         left, top, right, bottom = box
-        inner = QRectF(
+        soft = pick.window.feather
+        return self._rect(box), self._rect((left - soft, top - soft, right + soft, bottom + soft))
+
+    def _rect(self, box: Box) -> QRectF:
+        """Return where a box of the palette's clip is in the widget."""
+        (x, y), (left, top, right, bottom) = proxy_of(self.session), box
+        return QRectF(
             self.viewer.point_of(left * x, top * y), self.viewer.point_of(right * x, bottom * y)
         )
-        dx, dy = soft * x * scale, soft * y * scale
-        return inner, inner.adjusted(-dx, -dy, dx, dy)
 
     def _of_clip(self, point: QPointF) -> QPointF:
         """Return a point of the widget in pixels of the palette's clip."""
@@ -183,6 +186,13 @@ class WindowHandles:
         ends = (rect.left(), rect.top(), rect.right(), rect.bottom())
         left, top, right, bottom = ((math.floor(end * dense) + 0.5) / dense for end in ends)
         return QRectF(QPointF(left, top), QPointF(right, bottom))
+
+    def paint_proposed(self, painter: QPainter, box: Box) -> QRectF:
+        """Draw a window that is proposed; return its upper left corner."""
+        rect = self._sharp(self._rect(box))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        paint.ring(painter, lambda: painter.drawRect(rect), dashed=True)
+        return QRectF(rect.topLeft() + QPointF(4, 8), QSizeF())
 
     def paint(self, painter: QPainter) -> None:
         """Draw the box with its handles, and dashed where its feather ends."""
