@@ -105,6 +105,8 @@ def draw_picks(folder: Path) -> None:
     draw("studio_versions", sidecar, 53, versions)
     edit(sidecar, "change", "p1", "--to", "#b5541c")
     draw("studio_scopes", sidecar, 53, scopes, part="scopes")
+    edit(sidecar, "window", "p1", *at, "--box", "640,380,1180,700", "--feather", "120")
+    draw("studio_window", sidecar, 53, picks, size=(1400, 860), part="viewer")
 
 
 def whole(window: Any) -> None:
