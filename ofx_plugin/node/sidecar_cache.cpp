@@ -27,11 +27,11 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = fs::file_time_type::clock;
 
-/// Prepared frames kept for each sidecar: more than a host renders at a time.
+/// Prepared frames kept: more than the instances of a project render at a time.
 std::size_t most_frames() {
     // Called for every tile, and counting processors is a system call.
     static const std::size_t most =
-        std::max<std::size_t>(32, 4 * std::thread::hardware_concurrency());
+        std::max<std::size_t>(256, 4 * std::thread::hardware_concurrency());
     return most;
 }
 constexpr std::size_t kMaxSidecars = 32;
@@ -226,8 +226,91 @@ std::string revision_of(const std::string& text) {
     return digits + "-" + std::to_string(text.size());
 }
 
+/// A frame of a sidecar, which the threads that want it share.
+struct LoadedSidecar::Prepared {
+    std::mutex building;
+    std::shared_ptr<const Recolourer> recolourer;
+    std::list<std::pair<Frames*, Frames::iterator>>::iterator place;  ///< among the recent frames
+    std::size_t bytes = 0;                                            ///< 0 until it is prepared
+    bool kept = true;
+};
+
+/// The prepared frames of all sidecars, whose memory is bounded together.
+class RecentFrames {
+public:
+    using Frame = LoadedSidecar::Prepared;
+    using Frames = LoadedSidecar::Frames;
+
+    /// Never destroyed: at the end of a process sidecars still go.
+    static RecentFrames& of_process() {
+        static auto* const all = new RecentFrames;
+        return *all;
+    }
+
+    /// The frame of a sidecar, which is now the one used last.
+    std::shared_ptr<Frame> get(Frames& frames, const LoadedSidecar::Key& key) {
+        Dropped dropped;
+        const std::lock_guard<std::mutex> lock(mutex_);
+        auto at = frames.find(key);
+        if (at == frames.end()) {
+            List place(1);
+            at = frames.emplace(key, std::make_shared<Frame>()).first;
+            place.front() = {&frames, at};
+            at->second->place = place.begin();
+            recent_.splice(recent_.begin(), place);
+        } else {
+            recent_.splice(recent_.begin(), recent_, at->second->place);
+        }
+        const std::shared_ptr<Frame> found = at->second;
+        drop_oldest(dropped);
+        return found;
+    }
+
+    /// Counts the memory of a frame that has just been prepared.
+    void weigh(Frame& frame) {
+        Dropped dropped;
+        const std::lock_guard<std::mutex> lock(mutex_);
+        if (!frame.kept) return;
+        frame.bytes = frame.recolourer->bytes();
+        bytes_ += frame.bytes;
+        drop_oldest(dropped);
+    }
+
+    /// Forgets the frames of a sidecar that goes.
+    void forget(const Frames& frames) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        for (const auto& [key, frame] : frames) {
+            bytes_ -= frame->bytes;
+            frame->kept = false;
+            recent_.erase(frame->place);
+        }
+    }
+
+private:
+    using List = std::list<std::pair<Frames*, Frames::iterator>>;
+    /// Freed after the mutex: that may take a while.
+    using Dropped = std::vector<std::shared_ptr<Frame>>;
+
+    void drop_oldest(Dropped& dropped) {
+        while (recent_.size() > 1 && (recent_.size() > most_frames() || bytes_ > kMaxKeptBytes)) {
+            const auto [frames, at] = recent_.back();
+            dropped.push_back(at->second);
+            bytes_ -= at->second->bytes;
+            at->second->kept = false;
+            recent_.pop_back();
+            frames->erase(at);
+        }
+    }
+
+    std::mutex mutex_;
+    List recent_;  ///< the one used last first
+    std::size_t bytes_ = 0;
+};
+
 LoadedSidecar::LoadedSidecar(Sidecar sidecar, std::string revision)
     : sidecar_(std::move(sidecar)), revision_(std::move(revision)) {}
+
+LoadedSidecar::~LoadedSidecar() { RecentFrames::of_process().forget(frames_); }
 
 std::shared_ptr<LoadedSidecar> LoadedSidecar::version(const std::string& name) {
     for (const NamedVersion& one : sidecar_.versions) {
@@ -286,30 +369,16 @@ LoadedSidecar::Key LoadedSidecar::clamped(const Key& wanted) const {
     return key;
 }
 
-std::shared_ptr<LoadedSidecar::Prepared> LoadedSidecar::entry(const Key& key) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    const auto [at, is_new] = frames_.try_emplace(key);
-    if (is_new) {
-        at->second = std::make_shared<Prepared>();
-    } else {
-        recent_.remove(&at->first);
-    }
-    recent_.push_front(&at->first);
-    const std::shared_ptr<Prepared> found = at->second;
-    while (recent_.size() > most_frames()) {
-        const Key* oldest = recent_.back();
-        recent_.pop_back();
-        frames_.erase(frames_.find(*oldest));
-    }
-    return found;
-}
-
 std::shared_ptr<const Recolourer> LoadedSidecar::prepared(const Key& wanted) {
     const Key key = clamped(wanted);
-    const std::shared_ptr<Prepared> prepared = entry(key);
+    RecentFrames& recent = RecentFrames::of_process();
+    const std::shared_ptr<Prepared> prepared = recent.get(frames_, key);
     // Only threads that want this frame wait for it.
     const std::lock_guard<std::mutex> lock(prepared->building);
-    if (!prepared->recolourer) prepared->recolourer = prepare(key);
+    if (!prepared->recolourer) {
+        prepared->recolourer = prepare(key);
+        recent.weigh(*prepared);
+    }
     return prepared->recolourer;
 }
 

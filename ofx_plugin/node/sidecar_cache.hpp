@@ -26,11 +26,18 @@ struct AppliedEdits {
 };
 bool operator<(const AppliedEdits& a, const AppliedEdits& b);
 
+/// Most memory of prepared frames, of all sidecars together, that are kept for the next tile or
+/// render. The frame that was used last is kept whatever it takes.
+constexpr std::size_t kMaxKeptBytes = std::size_t{512} << 20;
+
 /// One version of a sidecar file. Immutable except for its cache of prepared frames.
 class LoadedSidecar {
 public:
     /// `revision` identifies the content.
     LoadedSidecar(Sidecar sidecar, std::string revision);
+    ~LoadedSidecar();
+    LoadedSidecar(const LoadedSidecar&) = delete;
+    LoadedSidecar& operator=(const LoadedSidecar&) = delete;
 
     const Sidecar& sidecar() const { return sidecar_; }
     const std::string& revision() const { return revision_; }
@@ -52,15 +59,13 @@ public:
                                                                const AppliedEdits& edits) const;
 
 private:
+    friend class RecentFrames;
     /// What a prepared palette is for.
     enum class Purpose { kEdit, kWeight, kSurface, kPick };
     using Key = std::tuple<double, Purpose, int, AppliedEdits>;
-    struct Prepared {
-        std::mutex building;
-        std::shared_ptr<const Recolourer> recolourer;
-    };
+    struct Prepared;
+    using Frames = std::map<Key, std::shared_ptr<Prepared>>;
     Key clamped(const Key& key) const;
-    std::shared_ptr<Prepared> entry(const Key& key);
     std::shared_ptr<const Recolourer> prepared(const Key& key);
     std::shared_ptr<const Recolourer> prepare(const Key& key) const;
 
@@ -68,8 +73,7 @@ private:
     const std::string revision_;
     std::mutex mutex_;
     std::map<std::string, std::shared_ptr<LoadedSidecar>> versions_;  ///< those in use so far
-    std::map<Key, std::shared_ptr<Prepared>> frames_;
-    std::list<const Key*> recent_;  ///< keys of frames_, most recent first
+    Frames frames_;                                                   ///< RecentFrames' alone
 };
 
 /// A sidecar, or a sentence that says why there is none.

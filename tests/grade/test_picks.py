@@ -8,13 +8,13 @@ import pytest
 from grade.test_answer import document_of
 
 import palette4d
-from palette4d.common.errors import Palette4dError
-from palette4d.grade import later, mattes, pick_edits
+from palette4d.common.errors import Palette4dError, SidecarError
+from palette4d.grade import later, mattes, pick_edits, sidecar
 from palette4d.grade.clip_colours import ClipColours
 from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.document import Document
 from palette4d.grade.later import with_readings
-from palette4d.grade.picks import PathKey, Pick, Window, WindowKey
+from palette4d.grade.picks import MOST_PICKS, PathKey, Pick, Window, WindowKey
 from palette4d.media.array_clip import ArrayClip
 
 GREY = (0.5, 0.5, 0.5)
@@ -275,3 +275,24 @@ def test_a_window_is_followed_when_the_clip_is_read(monkeypatch: pytest.MonkeyPa
     grade, history = later.completed(made, document.history, steps, readings, {})
     assert grade.pick("p1") == trial.grade.pick("p1")
     assert not history.done[-1].unread
+
+
+def test_python_and_the_core_allow_as_many_enabled_picks(tmp_path: Path) -> None:
+    fields = sidecar.load(SPLIT)
+    made = [Pick(f"q{i}", "hold", 8, (i / 500, 0.5, 0.5)) for i in range(MOST_PICKS + 30)]
+    picks = [replace(p, enabled=i < MOST_PICKS).to_fields() for i, p in enumerate(made)]
+    fields |= {"version": 2, "edits": {**fields["edits"], "picks": picks}}
+    full = Document(fields)
+    with pytest.raises(Palette4dError, match=f"at most {MOST_PICKS} can be enabled"):
+        full.pick(8, colour=GREY, by=(0.2, 0, 0), follow=False)
+    with pytest.raises(Palette4dError, match=f"at most {MOST_PICKS} can be enabled"):
+        full.change_pick(made[-1].id, enabled=True)
+    # One that is disabled makes room; the steps, which are not drawn, name one more.
+    full.change_pick("q0", enabled=False)
+    full.change_pick(made[-1].id, enabled=True)
+    full.save(tmp_path / "full.p4d.json")
+    again = Document.load(tmp_path / "full.p4d.json")
+    assert sum(one.enabled for one in again.grade.picks) == MOST_PICKS
+    picks[-1]["enabled"] = True
+    with pytest.raises(SidecarError, match=rf"/edits/picks: found {MOST_PICKS + 1} enabled"):
+        Document(fields)

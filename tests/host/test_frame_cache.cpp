@@ -1,7 +1,9 @@
 // What is prepared for a frame is prepared once, whoever asks and however often. Sees the node's
 // cache from inside: the bundle itself shows no more than its pictures.
 #include <atomic>
+#include <memory>
 #include <set>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -61,4 +63,36 @@ TEST(threads_and_tiles_share_what_is_prepared_for_a_frame) {
     CHECK(all.size() == kFrames);
     palette4d::node::purge_sidecars();
     CHECK(load_sidecar(path).loaded->recolourer_at(11.25).get() != seen[0][0][0].get());
+}
+
+TEST(frames_with_many_picks_are_dropped_by_their_bytes) {
+    std::string picks;
+    for (int i = 0; i < 100; ++i) {
+        picks += std::string(i ? "," : "") + "{\"id\": \"q" + std::to_string(i) +
+                 "\", \"kind\": \"pick\", \"frame\": 12, \"rgb\": [0.75, 0.25, 0.25], \"to\": [0." +
+                 std::to_string(100 + i) + ", 0.5, 0.75]}";
+    }
+    std::string text = test::sidecar_text();
+    text.insert(text.find("\"edits\": {") + 10, "\"picks\": [" + picks + "], ");
+    // Two files: all sidecars of the process share the memory.
+    const auto one = load_sidecar(test::write("one.p4d.json", text)).loaded;
+    const auto two = load_sidecar(test::write("two.p4d.json", text + "\n")).loaded;
+    CHECK(one && two && one != two);
+    std::vector<std::weak_ptr<const Recolourer>> seen;
+    const std::size_t mattes = 100 * palette4d::MatteGrid::kSize * sizeof(float);
+    for (int i = 0; i < 12; ++i) {
+        const auto made = (i % 2 ? one : two)->recolourer_at(10 + 0.5 * i);
+        CHECK(made->picks().picks.size() == 100);
+        CHECK(made->bytes() >= mattes);
+        seen.push_back(made);
+    }
+    std::size_t kept = 0;
+    for (const auto& frame : seen) {
+        if (const auto alive = frame.lock()) kept += alive->bytes();
+    }
+    test::figure(std::to_string(kept >> 20) + " MiB of frames kept");
+    EXPECT(kept <= palette4d::node::kMaxKeptBytes, std::to_string(kept) + " bytes are kept");
+    // The last ones are still there.
+    CHECK(two->recolourer_at(15) == seen[10].lock());
+    CHECK(one->recolourer_at(15.5) == seen[11].lock());
 }

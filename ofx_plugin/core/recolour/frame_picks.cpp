@@ -178,6 +178,12 @@ bool FramePicks::windows() const {
                        [](const FramePick& pick) { return pick.window.has_value(); });
 }
 
+std::size_t FramePicks::bytes() const {
+    std::size_t sum = vector_bytes(picks);
+    for (const FramePick& pick : picks) sum += vector_bytes(*pick.matte);
+    return left ? sum + vector_bytes(*left) : sum;
+}
+
 FramePicks picks_at(const Edits& edits, double frame) {
     FramePicks result = none_of(edits);
     const std::vector<Held> held = held_at(moments(edits, frame, true));
@@ -335,6 +341,7 @@ typename PickPlan<T>::Grid PickMemory<T>::grid(const std::shared_ptr<const Frame
     const Extent extent(*matte, idle);
     set_bounds<T>(extent, grid);
     mattes_.push_back(arranged(matte, extent, grid));
+    if (mattes_.back() != matte) arranged_bytes_ += vector_bytes(*mattes_.back());
     grid.values = mattes_.back()->data();
     return grid;
 }
@@ -383,6 +390,11 @@ PickPlan<T> PickMemory<T>::plan() const {
             static_cast<int>(display_.size()),
             display_from_,
             display_scale_};
+}
+
+template <class T>
+std::size_t PickMemory<T>::bytes() const {
+    return vector_bytes(picks_, display_) + arranged_bytes_;
 }
 
 template class PickMemory<float>;

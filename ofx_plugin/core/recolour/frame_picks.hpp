@@ -17,6 +17,7 @@
 
 #include "model/edits.hpp"
 #include "model/matte.hpp"
+#include "model/vector_bytes.hpp"
 #include "recolour/pick_kernels.hpp"
 
 namespace palette4d {
@@ -43,6 +44,7 @@ struct FramePicks {
 
     /// Whether a pick has one.
     bool windows() const;
+    std::size_t bytes() const;
 };
 
 /// The enabled picks and holds that ask for something at a frame.
@@ -75,6 +77,8 @@ public:
     PickMemory(const FramePicks& picks, const std::vector<Vec3>& done);
     /// Valid while this is.
     PickPlan<T> plan() const;
+    /// Without the mattes that it shares with `picks`.
+    std::size_t bytes() const;
 
 private:
     /// In the form that the kernels read; `idle` are the values that do nothing.
@@ -83,6 +87,7 @@ private:
     std::vector<typename PickPlan<T>::One> picks_;
     typename PickPlan<T>::Grid left_{};
     std::vector<std::shared_ptr<const FrameMatte>> mattes_;
+    std::size_t arranged_bytes_ = 0;
     std::vector<T> display_;
     T display_from_ = 0, display_scale_ = 1;
 };

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "model/polytope.hpp"
+#include "model/vector_bytes.hpp"
 
 namespace palette4d {
 
@@ -44,6 +45,7 @@ public:
     bool degenerate(std::size_t face) const { return planes_[face].degenerate; }
     const Vec3& normal(std::size_t face) const { return planes_[face].normal; }
     const std::vector<std::size_t>& skin() const { return skin_; }
+    std::size_t bytes() const { return vector_bytes(rgb_, faces_, planes_, edges_, skin_); }
 
     /// Mean value coordinates of p: n weights that sum to 1 and reproduce p. On a vertex, edge or
     /// face they are its barycentric weights. A triangle whose plane contains p, with p outside the

@@ -54,6 +54,16 @@ Recolourer::Recolourer(std::vector<Vec3> original, const std::vector<Vec3>& edit
 
 Recolourer::~Recolourer() = default;
 
+std::size_t Recolourer::bytes() const {
+    std::size_t sum =
+        sizeof *this + body_.bytes() + vector_bytes(displacement_, displaced_) + picks_.bytes();
+    if (plan_) {
+        sum += plan_->single.palette.bytes() + plan_->single.picks.bytes() +
+               plan_->twofold.palette.bytes() + plan_->twofold.picks.bytes();
+    }
+    return sum;
+}
+
 Vec3 Recolourer::palette_displacement(const Vec3& p, std::vector<double>& weights,
                                       PaletteBody::Workspace& workspace) const {
     if (!palette_moves()) return {0, 0, 0};

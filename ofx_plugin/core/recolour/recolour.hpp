@@ -29,6 +29,8 @@ public:
     /// Whether some vertex moves.
     bool palette_moves() const { return !displaced_.empty(); }
     const FramePicks& picks() const { return picks_; }
+    /// The memory that it takes.
+    std::size_t bytes() const;
     /// `in` and `out` have the same size and channels, and may be the same memory. A pixel's result
     /// depends on that pixel, its place and the options only, not on threads or processor. Colours
     /// with NaN or infinity pass; so do premultiplied ones whose alpha is 0 or not finite. Throws

@@ -22,6 +22,9 @@ public:
     /// Whether squares and products of the palette's lengths stay within the range of T. True
     /// where no vertex moves: plan() then has no movers, and nothing else.
     bool usable() const { return usable_; }
+    std::size_t bytes() const {
+        return vector_bytes(vertices_, movers_, edges_, faces_, segments_, triangles_);
+    }
 
 private:
     void add_inside(const PaletteBody& body);

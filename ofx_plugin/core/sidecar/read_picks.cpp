@@ -13,6 +13,9 @@
 namespace palette4d {
 namespace {
 
+/// Of one set of edits, which may be drawn: each takes 0.6 MB, and time, for each frame. As
+/// MOST_PICKS of grade/picks.py.
+constexpr std::size_t kMaxEnabled = 100;
 /// Each key of a path costs time for each frame.
 constexpr std::size_t kMaxPathKeys = 20'000;
 /// Points of strokes in all; of a stroke drawn by hand there are some hundreds.
@@ -21,7 +24,7 @@ constexpr std::size_t kMaxPoints = 100'000;
 /// What the picks of a file have together.
 struct Counts {
     std::set<std::string> ids;
-    std::size_t keys = 0, points = 0;
+    std::size_t enabled = 0, keys = 0, points = 0;
 };
 
 PickWindow read_window(const Cursor& where, Counts& counts) {
@@ -62,6 +65,7 @@ Pick read_pick(const Cursor& where, const PickMattes& mattes, Counts& counts) {
     pick.fade = number("fade", 0);
     pick.fade_out = frame("fade_out");
     pick.enabled = fields.value("enabled", true);
+    counts.enabled += pick.enabled;
     if (where.has("path")) {
         const Cursor path = where.member("path");
         path.limit(counts.keys += path.size(), kMaxPathKeys, "colours and boxes over time in all");
@@ -156,6 +160,7 @@ std::vector<Pick> read_picks(const Cursor& where, const PickMattes& mattes) {
     for (std::size_t i = 0; i < where.size(); ++i) {
         picks.push_back(read_pick(where.element(i), mattes, counts));
     }
+    where.limit(counts.enabled, kMaxEnabled, "enabled picks and holds");
     return picks;
 }
 

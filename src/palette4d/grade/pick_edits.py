@@ -254,6 +254,8 @@ def change_pick(
     if old.kind == "hold" and bad:
         raise Palette4dError(f"{id} is a hold, which has no {' and no '.join(sorted(bad))}")
     new = _with_one_fade(replace(old, **changes))
+    if new.enabled and not old.enabled:
+        _check_room(grade)
     grade.check_frame(new.frame)
     check(new, grade.frames)
     moved = {"frame", "rgb", "start", "until", "fade", "fade_out"} & changes.keys()
@@ -335,15 +337,20 @@ def _picked(grade: Grade, clip: ClipOfPicks, frame: float, where: Where) -> Pick
     )
 
 
-def _add(
-    grade: Grade, clip: ClipOfPicks, made: Pick, asked: When, progress: Progress | None
-) -> tuple[Grade, Pick]:
+def _check_room(grade: Grade) -> None:
+    """Refuse one more enabled pick or hold than a sidecar may have."""
     enabled = sum(other.enabled for other in grade.picks)
     if enabled >= MOST_PICKS:
         raise Palette4dError(
             f"there are {enabled} picks and holds, and at most {MOST_PICKS} can be "
             "enabled; remove or disable some (`unpick`, `disable`)"
         )
+
+
+def _add(
+    grade: Grade, clip: ClipOfPicks, made: Pick, asked: When, progress: Progress | None
+) -> tuple[Grade, Pick]:
+    _check_room(grade)
     given: dict[str, Any] = {**asked, "areas": tuple(asked.get("areas", ()))}
     when = ("areas", "start", "until", "fade", "fade_out")
     made = _with_one_fade(replace(made, **{name: given[name] for name in when if name in given}))

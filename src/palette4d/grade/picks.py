@@ -25,7 +25,7 @@ F64 = NDArray[np.float64]
 Kind = Literal["pick", "hold"]
 Toward = Literal["shift", "colour"]
 
-#: Most enabled picks and holds: each costs time for each pixel.
+#: Most enabled picks and holds, as in the core (read_picks.cpp): each costs time for each pixel.
 MOST_PICKS = 100
 
 #: Standard deviation, in code values, of one object's colours when a colour is followed.

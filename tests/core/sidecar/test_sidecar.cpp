@@ -272,6 +272,37 @@ TEST(picks_and_mattes_are_bounded) {
         std::string("/edits/picks/0/areas/0/points"));
 }
 
+TEST(picks_that_are_drawn_are_bounded) {
+    const auto picks = [](int enabled, int disabled) {
+        std::string list;
+        for (int i = 0; i < enabled + disabled; ++i) {
+            list += std::string(i ? "," : "") + "{\"id\": \"q" + std::to_string(i) +
+                    "\", \"kind\": \"hold\", \"frame\": 3, \"rgb\": [0.4, 0.3, 0.25]" +
+                    (i < enabled ? "}" : ", \"enabled\": false}");
+        }
+        return "\"stops\": [], \"picks\": [" + list + "]";
+    };
+    const std::string text = replaced(golden("tetrahedron"), "\"version\": 1", "\"version\": 2");
+    const auto with = [&](const std::string& list) {
+        return replaced(text, "\"stops\": []", list);
+    };
+    const auto version = [&](const std::string& list) {
+        return replaced(text, "\"extra\": {",
+                        "\"versions\": [{\"name\": \"one\", \"edits\": {\"vertices\": [], " + list +
+                            "}}], \"extra\": {");
+    };
+    // What is not drawn may be kept.
+    CHECK_EQUAL(parse_sidecar(with(picks(100, 30)), "many").edits.picks.size(), 130u);
+    CHECK_EQUAL(parse_sidecar(version(picks(100, 30)), "many").versions[0].edits.picks.size(),
+                130u);
+    const SidecarError problem = refused(with(picks(101, 30)));
+    CHECK_EQUAL(problem.pointer(), std::string("/edits/picks"));
+    CHECK(holds(problem.what(),
+                "found 101 enabled picks and holds, expected at most 100 enabled picks and holds"));
+    // A host may show any version.
+    CHECK_EQUAL(refused(version(picks(101, 0))).pointer(), std::string("/versions/0/edits/picks"));
+}
+
 TEST(size_is_bounded) {
     std::string many = "[";
     for (int i = 0; i < 4'000'001; ++i) many += "0,";
