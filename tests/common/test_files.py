@@ -7,7 +7,9 @@ import stat
 import struct
 import subprocess
 import sys
-from collections.abc import Callable
+import threading
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path, PureWindowsPath
 
 import access_lists
@@ -16,7 +18,7 @@ from access_lists import for_one
 from posix_files import folders, links, locks, modes, pipes
 
 from palette4d.colour.ocio_config import config_of_sidecar
-from palette4d.common import files
+from palette4d.common import files, locking
 from palette4d.common.errors import Palette4dError, WriteError
 from palette4d.common.files import replacing
 from palette4d.media.source_clip import candidates
@@ -362,12 +364,24 @@ with replacing(Path(sys.argv[1]), force=True) as temporary:
     os.kill(os.getpid(), 9)
 """
 
+KILLED_IN_FOLDER = """
+import os, sys
+from pathlib import Path
+from palette4d.common.files import temporary_folder
+with temporary_folder(Path(sys.argv[1]).parent) as folder:
+    (folder / "below" / "deeper").mkdir(parents=True)
+    (folder / "below" / "file").touch()
+    (folder / "file").touch()
+    os.kill(os.getpid(), 9)
+"""
+
 
 @locks
+@pytest.mark.parametrize("program", [KILLED, KILLED_IN_FOLDER])
 def test_the_next_process_removes_what_a_killed_one_left(
-    old: Path, monkeypatch: pytest.MonkeyPatch
+    old: Path, program: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    killed = subprocess.run([sys.executable, "-c", KILLED, old], check=False)
+    killed = subprocess.run([sys.executable, "-c", program, old], check=False)
     assert killed.returncode == -9
     assert old.read_bytes() == b"old"
     assert len(names(old.parent)) == 2
@@ -376,6 +390,102 @@ def test_the_next_process_removes_what_a_killed_one_left(
     monkeypatch.setattr(files, "_swept", set())
     replace(old, lambda: None)
     assert names(old.parent) == [alike.name, old.name]
+
+
+def make_deep(path: Path) -> None:
+    path.mkdir()
+    handle = os.open(path, os.O_RDONLY)
+    for _ in range(3000):
+        os.mkdir("a", dir_fd=handle)
+        inner = os.open("a", os.O_RDONLY, dir_fd=handle)
+        os.close(handle)
+        handle = inner
+    os.close(handle)
+
+
+@pytest.fixture
+def deep_folder(tmp_path: Path) -> Iterator[Callable[[Path], None]]:
+    """Makes a folder that is deeper than any path, and than Python's stack."""
+    yield make_deep
+    subprocess.run(["rm", "-rf", *tmp_path.iterdir()], check=True)
+
+
+@links
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs root")
+def test_what_another_user_left_stays(
+    old: Path, deep_folder: Callable[[Path], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only he could tell whether it is left over; nothing of it holds up a writer."""
+    stranger = 65534
+    made = [old.with_name(f".a.{digit * 16}.p4d-tmp.cube") for digit in "0123"]
+    made[0].touch()
+    os.mkfifo(made[1])
+    made[2].symlink_to(old)
+    deep_folder(made[3])
+    lock = old.with_name(".b.cube.lock")
+    lock.write_text(locking._computer() + f" {2**22 + 1} {'0' * 16}")
+    for path in (*made, lock):
+        os.chown(path, stranger, stranger, follow_symlinks=False)
+    monkeypatch.setattr(files, "_swept", set())
+    replace(old, lambda: None)
+    assert names(old.parent) == sorted([lock.name, old.name, *(one.name for one in made)])
+    assert names(made[3]) == ["a"]
+
+
+@modes
+@pytest.mark.parametrize("mode", [0o700, 0o755])
+def test_a_folder_that_was_renamed_to_look_left_over_keeps_its_files(
+    old: Path, mode: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a shared folder others may rename the user's folders, and change nothing in them."""
+    folder = old.with_name(f".palette4d.{'0' * 16}.p4d-tmp")
+    folder.mkdir(mode)
+    (folder / "precious").touch()
+    monkeypatch.setattr(files, "_swept", set())
+    replace(old, lambda: None)
+    assert names(folder) == ["precious"]
+
+
+@links
+def test_a_folder_too_deep_to_remove_holds_up_no_writer(
+    old: Path, deep_folder: Callable[[Path], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with files.temporary_folder(old.parent) as own:
+        deep_folder(own / "a")
+    assert names(old.parent) == [own.name, old.name]
+    monkeypatch.setattr(files, "_swept", set())
+    replace(old, lambda: None)
+    assert old.read_bytes() == b"new"
+
+
+@pipes
+def test_a_pipe_that_takes_a_leftovers_place_holds_up_no_writer(
+    old: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, left = os.open, old.with_name(f".a.{'0' * 16}.p4d-tmp")
+    # Who reads a pipe waits until somebody has it open for writing.
+    at_last = threading.Timer(3, lambda: ends.append(real(left, os.O_RDWR)))
+    ends: list[int] = []
+
+    def opened(path: Path | str, flags: int, *mode: int, **where: int | None) -> int:
+        if os.fspath(path) == str(left) and left.is_dir():
+            left.rmdir()
+            os.mkfifo(left)
+            at_last.start()
+        return real(path, flags, *mode, **where)
+
+    left.mkdir()
+    monkeypatch.setattr(os, "open", opened)
+    monkeypatch.setattr(files, "_swept", set())
+    start = time.monotonic()
+    replace(old, lambda: None)
+    waited = time.monotonic() - start
+    at_last.cancel()
+    at_last.join()
+    for end in ends:
+        os.close(end)
+    assert waited < 2
+    assert stat.S_ISFIFO(left.stat().st_mode)
 
 
 def test_files_that_are_being_written_are_no_leftovers(

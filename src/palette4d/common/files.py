@@ -26,6 +26,9 @@ EXISTS = f"found a file there already; choose another name, or replace it with {
 _TEMPORARY = re.compile(r"\..*\.[0-9a-f]{16}\.p4d-tmp(\.[^.]*)?", re.DOTALL)
 #: Seconds after which a temporary file counts as left over where files cannot be locked.
 _LEFT_OVER_AFTER = 86400.0
+#: Mode of temporary folders: another user could give the name of one to any folder of ours that he
+#: may rename, but not this mode. The sticky bit on a closed folder does nothing else.
+_TEMPORARY_FOLDER = 0o1700
 _swept: set[Path] = set()
 #: The extended attribute of Linux that holds an access list.
 ACCESS_LIST = "system.posix_acl_access"
@@ -142,8 +145,8 @@ def replacing(
     because libraries choose the format by it. File and folder are synced. A replaced file keeps its
     owner, group, permissions, access list and extended attributes as far as the user may set them;
     nobody gets more rights. An error or Ctrl-C in the body removes the temporary file and leaves
-    `path` unchanged. The next process that writes in the folder removes what a killed process left
-    there.
+    `path` unchanged. The user's next process that writes in the folder removes what a killed one
+    left there.
 
     Parameters
     ----------
@@ -225,16 +228,26 @@ def temporary_folder(parent: Path) -> Generator[Path]:
             lock = None if sys.platform == "win32" else os.open(folder, os.O_RDONLY)
         except FileNotFoundError:  # Another process, which removes what is left over, was faster.
             continue
-        if lock is None or _is_locked(lock):
+        if sys.platform == "win32" or lock is None:
+            break
+        if _is_locked(lock):
+            with contextlib.suppress(OSError):  # a file system without modes
+                os.fchmod(lock, _TEMPORARY_FOLDER)
             break
         os.close(lock)
-        shutil.rmtree(folder, ignore_errors=True)
+        _remove_folder(folder)
     try:
         yield folder
     finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        _remove_folder(folder)
         if lock is not None:
             os.close(lock)
+
+
+def _remove_folder(folder: Path) -> None:
+    """Remove a folder; what cannot be removed stays, such as one that is 1,000s deep."""
+    with contextlib.suppress(RecursionError):
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _temporary_name(path: Path) -> Path:
@@ -329,45 +342,82 @@ def _is_locked(handle: int) -> bool:
 
 
 def _remove_leftovers(folder: Path) -> None:
-    """Remove what killed processes left, once for each folder: temporary files, folders, locks."""
+    """Remove what killed processes left, once for each folder: temporary files, folders, locks.
+
+    Only the user's own: in a shared folder, others could give such names to anything.
+    """
     if folder in _swept:
         return
     _swept.add(folder)
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
         for entry in list(entries):
-            remove_left_over(Path(entry))
-            if _TEMPORARY.fullmatch(entry.name):
-                with contextlib.suppress(OSError):
-                    if not _is_left_over(entry):
-                        continue
-                    if entry.is_dir(follow_symlinks=False):
-                        shutil.rmtree(entry)
-                    else:
-                        Path(entry).unlink()
+            with contextlib.suppress(OSError, RecursionError):  # of folders that are 1,000s deep
+                if not entry.name.startswith(".") or not _is_own(entry.stat(follow_symlinks=False)):
+                    continue
+                remove_left_over(Path(entry))
+                if _TEMPORARY.fullmatch(entry.name):
+                    _remove_left_over(entry)
 
 
-def _is_left_over(entry: os.DirEntry[str]) -> bool:
-    """Whether no process uses a temporary file any more: its lock ends with the process."""
+def _is_own(about: os.stat_result) -> bool:
+    """Whether a file is of the user who runs this process; Windows does not say."""
+    return sys.platform == "win32" or about.st_uid == os.geteuid()
+
+
+def _remove_left_over(entry: os.DirEntry[str]) -> None:
+    """Remove a temporary file or folder that no process uses: its lock ends with the process."""
     if entry.is_symlink():
-        return True
-    if sys.platform == "win32":
-        return time.time() - entry.stat().st_mtime > _LEFT_OVER_AFTER
-    access = os.O_RDONLY if entry.is_dir() else os.O_RDWR
-    handle = os.open(entry.path, access | getattr(os, "O_NOFOLLOW", 0))
-    try:
-        locked = _lock(handle)
-        if locked:
-            # Some file systems grant every lock.
-            again = os.open(entry.path, access | getattr(os, "O_NOFOLLOW", 0))
-            try:
-                locked = None if _lock(again) else True
-            finally:
-                os.close(again)
-        if locked is None:
-            return time.time() - os.fstat(handle).st_mtime > _LEFT_OVER_AFTER
-        return locked
-    finally:
-        os.close(handle)
+        Path(entry).unlink()
+    elif sys.platform == "win32":
+        if time.time() - entry.stat().st_mtime > _LEFT_OVER_AFTER:
+            if entry.is_dir():
+                shutil.rmtree(entry)
+            else:
+                Path(entry).unlink()
+    else:
+        # Another user may put something else in its place meanwhile, such as a pipe.
+        access = os.O_RDONLY if entry.is_dir() else os.O_RDWR
+        flags = access | os.O_NONBLOCK | os.O_NOFOLLOW
+        handle = os.open(entry.path, flags)
+        try:
+            about = os.fstat(handle)
+            if not _is_own(about) or not _is_unused(handle, about, entry.path, flags):
+                return
+            # While it is locked: a process that has just made it sees that it must make another.
+            if stat.S_ISREG(about.st_mode):
+                Path(entry).unlink()
+            elif stat.S_ISDIR(about.st_mode):
+                if stat.S_IMODE(about.st_mode) == _TEMPORARY_FOLDER:
+                    _empty(handle)
+                Path(entry).rmdir()
+        finally:
+            os.close(handle)
+
+
+def _empty(folder: int) -> None:
+    """Remove all that is in an open folder."""
+    if sys.platform != "win32":
+        with os.scandir(folder) as inside:
+            for one in list(inside):
+                if one.is_dir(follow_symlinks=False):
+                    shutil.rmtree(one.name, dir_fd=folder)
+                else:
+                    os.unlink(one.name, dir_fd=folder)
+
+
+def _is_unused(handle: int, about: os.stat_result, path: str, flags: int) -> bool:
+    """Lock a temporary file; return whether no process has it locked."""
+    locked = _lock(handle)
+    if locked:
+        # Some file systems grant every lock.
+        again = os.open(path, flags)
+        try:
+            locked = None if _lock(again) else True
+        finally:
+            os.close(again)
+    if locked is None:
+        return time.time() - about.st_mtime > _LEFT_OVER_AFTER
+    return locked
 
 
 def _lock(handle: int) -> bool | None:
