@@ -500,6 +500,21 @@ def test_files_that_are_being_written_are_no_leftovers(
     assert other.read_bytes() == b"slow"
 
 
+@locks
+def test_what_a_library_put_in_the_temporary_files_place_is_no_leftover(
+    old: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def sweep() -> None:
+        monkeypatch.setattr(files, "_swept", set())
+        replace(old.with_name("other.cube"), lambda: None)
+
+    with replacing(old, force=True, check=sweep) as temporary:
+        of_library = old.with_name("library")
+        of_library.write_bytes(b"new")
+        of_library.replace(temporary)
+    assert old.read_bytes() == b"new"
+
+
 def test_nobody_waits_for_a_lock_on_a_new_file(old: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Another user sees the new file first, and keeps a lock on it."""
     fcntl = pytest.importorskip("fcntl")

@@ -317,6 +317,37 @@ def test_an_output_has_no_rights_of_its_makers_choice(tmp_path: Path, there: boo
 
 
 @forks
+def test_an_output_that_is_being_placed_is_no_leftover(tmp_path: Path) -> None:
+    """Other processes that write in the folder remove what killed ones left."""
+    sweep = [
+        "from pathlib import Path",
+        "from palette4d.common import files",
+        "print('begun', flush=True)",
+        "while True:",
+        "    files._swept.clear()",
+        f"    files._remove_leftovers(Path({str(tmp_path / 'out')!r}))",
+    ]
+    (tmp_path / "out").mkdir()
+    with subprocess.Popen(
+        [sys.executable, "-P", "-c", "\n".join(sweep)], text=True, stdout=subprocess.PIPE
+    ) as sweeper:
+        try:
+            assert sweeper.stdout
+            assert sweeper.stdout.readline() == "begun\n"
+            with script(
+                tmp_path,
+                "for i in range(100):",
+                "    with files.replacing(Path('out/out.mov'), force=True) as path:",
+                "        path.write_bytes(bytes([i]) * 1_000_000)",
+            ) as done:
+                assert done.wait(timeout=60) == 0
+            assert sweeper.poll() is None
+        finally:
+            sweeper.kill()
+    assert (tmp_path / "out" / "out.mov").read_bytes() == bytes([99]) * 1_000_000
+
+
+@forks
 def test_a_command_that_is_killed_leaves_nothing(tmp_path: Path) -> None:
     """Its writer ends with it, gives the lock back, and removes the temporary folder."""
     with script(

@@ -175,6 +175,9 @@ def replacing(
         # Not by name: another user of the folder could put a link there now.
         written = os.open(temporary, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
         try:
+            if lock is not None and _lock(written):  # a library put a file of its own there
+                lock, first = os.dup(written), lock
+                os.close(first)
             os.fsync(written)
             with contextlib.suppress(FileNotFoundError):
                 _copy_permissions(path, written)
@@ -192,6 +195,17 @@ def replacing(
         if lock is not None:
             os.close(lock)
     _sync_folder(path.parent)
+
+
+@contextmanager
+def in_use(path: Path) -> Generator[None]:
+    """Lock a file, so that it is not left over for other processes; also once it is renamed."""
+    handle = os.open(path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
+    try:
+        _lock(handle)
+        yield
+    finally:
+        os.close(handle)
 
 
 def replace_by_link(path: Path, target: str) -> None:

@@ -229,8 +229,10 @@ def _taken(folder: Path, name: str) -> Path:
 def _place(taken: Path, path: Path, force: bool, promise: Promise) -> None:
     if not promise.holds(path) or not stat.S_ISREG(taken.lstat().st_mode):
         raise _unasked(path)
-    with files.replacing(path, force=force and promise.may_replace(path)) as own:
-        taken.chmod(stat.S_IMODE(own.stat().st_mode))  # its maker may have made it setuid
+    taken.chmod(0o600)  # its maker may have closed it, or made it setuid
+    replaces = force and promise.may_replace(path)
+    with files.in_use(taken), files.replacing(path, force=replaces) as own:
+        taken.chmod(stat.S_IMODE(own.stat().st_mode))
         shutil.move(taken, own)
 
 
