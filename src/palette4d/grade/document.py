@@ -666,6 +666,24 @@ class Document:
         self._saved(replace(grade, analysed=core), history, data)
 
 
+def put_back(document: Document, content: bytes) -> bytes:
+    """Give a document's file an earlier content; return what it had. Load it again then.
+
+    Raises
+    ------
+    Palette4dError
+        Another program has changed the file since the document was loaded or saved, or it cannot
+        be written.
+    """
+    file = document._file
+    assert file is not None
+    assert document.path is not None
+    target = link_target(document.path)
+    with locked(target) as held:
+        sidecar.write(target, content, held, replaces=file.data)
+    return file.data
+
+
 def _read(core: _core.Sidecar, fields: Fields, path: Path | None) -> tuple[Grade, History]:
     grade = Grade.of(core, fields, path)
     return grade, History(*history_of(fields, grade.name))

@@ -4,11 +4,15 @@ import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from palette4d.common.files import replacing
+from palette4d.common.errors import Palette4dError
 from palette4d.common.json_files import UnusableFile, read_regular
-from palette4d.grade.edits import Edit
+from palette4d.grade.document import put_back
+from palette4d.grade.edits import Edit, State
 from palette4d.studio import texts
 from palette4d.studio.session import Session
+
+#: The steps of a document, and what they led to: other programs may write no steps.
+Edits = tuple[tuple[Edit, ...], State]
 
 
 @dataclass(frozen=True)
@@ -17,7 +21,7 @@ class Content:
 
     path: Path
     data: bytes
-    done: tuple[Edit, ...]
+    edits: Edits | None
 
 
 class Former:
@@ -39,21 +43,21 @@ class Former:
     def written(self, path: Path) -> None:
         """Let undo bring back what the file had; call it when the new one is open."""
         if self._now is not None and self._now[0] == path.absolute():
-            self._past.append(Content(*self._now, self._done))
+            self._past.append(Content(*self._now, self._edits))
             self._future.clear()
         self._now = None
 
     @property
-    def _done(self) -> tuple[Edit, ...]:
+    def _edits(self) -> Edits | None:
         document = self.session.document
-        return () if document is None else document.history.done
+        return None if document is None else (document.history.done, document.grade.state)
 
     def _is_next(self, stack: list[Content]) -> bool:
         path = self.session.path
         return (
             bool(stack)
             and path is not None
-            and (path.absolute(), self._done) == (stack[-1].path, stack[-1].done)
+            and (path.absolute(), self._edits) == (stack[-1].path, stack[-1].edits)
         )
 
     @property
@@ -81,15 +85,20 @@ class Former:
             self.session.redo()
 
     def _change_places(self, stack: list[Content], other: list[Content], said: str) -> None:
-        wanted = stack[-1]
-        if not self.session.save():
+        wanted, document = stack[-1], self.session.document
+        if document is None or not self.session.save():
             return
-        data = read_regular(wanted.path)
-        with replacing(wanted.path, force=True) as temporary:
-            temporary.write_bytes(wanted.data)
+        if not self._is_next(stack):  # the save took over what another program wrote
+            self.session.say(texts.ANALYSIS_STAYS, "warning")
+            return
+        try:
+            data = put_back(document, wanted.data)
+        except (Palette4dError, OSError) as error:
+            self.session.report(error)
+            return
         stack.pop()
         self.session.select()
         self.session.revert()
         self.session.go(self.session.frame)
-        other.append(Content(wanted.path, data, self._done))
+        other.append(Content(wanted.path, data, self._edits))
         self.session.say(said)

@@ -23,6 +23,10 @@ UNDONE = "undone"
 REDONE = "redone"
 ANALYSIS_UNDONE = "the palette before the last analysis is back"
 ANALYSIS_REDONE = "the palette of the last analysis is back"
+ANALYSIS_STAYS = (
+    "another program edited the file, so the analysis stays; take its edits back first, or save "
+    "under another name"
+)
 MERGED = "another program edited the file too; the edits of both are kept"
 RELOADED = "another program edited the file; its edits are shown"
 BROKEN = "Another program wrote a file that cannot be used; your edits are kept here."
