@@ -90,11 +90,14 @@ void identify(Stamp& stamp, const fs::path& path) {
 #endif
 }
 
+using SteadyClock = std::chrono::steady_clock;
+
 /// The latest load of one path. Its mutex ensures that only one thread loads a new file.
 struct Entry {
     std::mutex mutex;
     bool read = false;
     Stamp stamp;
+    SteadyClock::time_point stamped{};  ///< when this stamp was first seen
     bool settled = false;  ///< the stamp was old enough to be trusted when the file was read
     std::string text;      ///< kept until settled, to see whether the content really changed
     SidecarResult result;
@@ -166,8 +169,10 @@ void refresh(Entry& entry, const fs::path& path, const std::string& name) {
         if (!before) break;
         const bool same = entry.read && *before == entry.stamp;
         if (same && entry.settled) return;
-        const bool settled = Clock::now() - before->modified > kSettled &&
-                             std::time(nullptr) - before->change_seconds > kSettled.count();
+        // A time may lie in the future: of another clock, or because somebody chose it.
+        const bool settled = (Clock::now() - before->modified > kSettled &&
+                              std::time(nullptr) - before->change_seconds > kSettled.count()) ||
+                             (same && SteadyClock::now() - entry.stamped > kSettled);
         std::optional<std::string> text = text_of(path);
         if (!text) {
             problem = "the file cannot be read";
@@ -182,6 +187,7 @@ void refresh(Entry& entry, const fs::path& path, const std::string& name) {
         if (!(entry.read && *text == entry.text && !entry.settled)) {
             entry.result = parse(*text, name);
         }
+        if (!entry.read || !(*after == entry.stamp)) entry.stamped = SteadyClock::now();
         entry.read = true;
         entry.stamp = *after;
         entry.settled = settled && *after == *before;

@@ -1,15 +1,28 @@
 #include "status.hpp"
 
+#include <algorithm>
 #include <iomanip>
 #include <locale>
 #include <optional>
 #include <sstream>
 #include <utility>
 
+#include "model/sidecar_error.hpp"
 #include "paths.hpp"
 
 namespace palette4d::node {
 namespace {
+
+/// Bytes of a clip's name that are shown: as many as a file's name has.
+constexpr std::size_t kLongestName = 255;
+
+std::string short_name(const std::string& name) {
+    std::size_t end = 0;
+    while (end < name.size() && end < kLongestName) {
+        end += std::max<std::size_t>(1, utf8_length(name, end));
+    }
+    return end < name.size() ? name.substr(0, end) + "..." : name;
+}
 
 std::string counted(std::size_t count, const char* one, const char* many) {
     return std::to_string(count) + " " + (count == 1 ? one : many);
@@ -21,7 +34,7 @@ std::string describe(const Sidecar& sidecar) {
     const ClipInfo& clip = sidecar.clip;
     std::ostringstream text;
     text.imbue(std::locale::classic());
-    text << clip.name << ": frames " << clip.first << "-" << clip.last << " at "
+    text << short_name(clip.name) << ": frames " << clip.first << "-" << clip.last << " at "
          << static_cast<double>(clip.rate_num) / static_cast<double>(clip.rate_den) << " fps, "
          << counted(sidecar.polytope.vertices().size(), "handle", "handles") << ", "
          << counted(edits, "edit", "edits");
@@ -41,6 +54,10 @@ std::string words_of_play(const Sidecar& sidecar) {
          << sidecar.play->in_point;
     return text.str();
 }
+
+/// Bytes of a line in the status or a message: two of the longest paths. Each text of a file may
+/// have 64 MB.
+constexpr std::size_t kLongestLine = 8192;
 
 /// The code point of two or three bytes at `i`, or of one byte below 128; its length otherwise 1.
 std::pair<unsigned, std::size_t> code_point(const std::string& text, std::size_t i) {
@@ -76,7 +93,15 @@ std::string words_of_versions(const Sidecar& sidecar) {
 std::string without_controls(const std::string& text) {
     static const char* const kDigits = "0123456789abcdef";
     std::string result;
+    std::size_t line = 0;  ///< where it begins in the result
     for (std::size_t i = 0; i < text.size();) {
+        if (text[i] == '\n') {
+            line = result.size() + 1;
+        } else if (result.size() - line >= kLongestLine) {
+            result += "...";
+            i = std::min(text.find('\n', i), text.size());
+            continue;
+        }
         const auto [code, length] = code_point(text, i);
         if (acts_on_terminals(code, length)) {
             result += "\\u";

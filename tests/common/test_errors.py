@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from palette4d.cli import main
-from palette4d.common.errors import Palette4dError, in_words
+from palette4d.common.errors import Palette4dError, SidecarError, in_words
 
 
 def problem_of(path: Path) -> OSError:
@@ -51,3 +51,9 @@ def test_the_command_line_says_no_errno(
     error = capsys.readouterr().err
     assert "Errno" not in error
     assert str(tmp_path) in error
+
+
+def test_a_long_place_in_a_file_is_cut() -> None:
+    error = SidecarError("clip.p4d.json", "/clip/" + "x" * 1_000_000, "nothing", "a number")
+    assert str(error).endswith("xxx...: found nothing, expected a number")
+    assert len(str(error)) < 500

@@ -376,6 +376,18 @@ with temporary_folder(Path(sys.argv[1]).parent) as folder:
 """
 
 
+def test_a_name_of_a_temporary_file_is_no_output(
+    old: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It would be removed by the next program that writes there."""
+    named = old.with_name(".clip.0123456789abcdef.p4d-tmp.json")
+    named.write_bytes(b"precious")
+    monkeypatch.setattr(files, "_swept", set())
+    with pytest.raises(Palette4dError, match="gives its temporary files"):
+        replace(named, lambda: None)
+    assert named.read_bytes() == b"precious"
+
+
 @locks
 @pytest.mark.parametrize("program", [KILLED, KILLED_IN_FOLDER])
 def test_the_next_process_removes_what_a_killed_one_left(

@@ -100,6 +100,20 @@ def test_no_acknowledged_edit_is_lost(tmp_path: Path, locks: tuple[str, ...], co
     assert sorted(file.name for file in tmp_path.iterdir()) == ["clip.p4d.json", "start"]
 
 
+@pytest.mark.parametrize("letter", ["x", "\N{CJK UNIFIED IDEOGRAPH-8272}"])
+def test_a_file_with_the_longest_name_has_a_lock(tmp_path: Path, letter: str) -> None:
+    whole = (255 - len(".p4d.json")) // len(letter.encode())
+    path = tmp_path / f"{letter * whole}.p4d.json"
+    path.write_bytes((GOLDEN / "v1_split.p4d.json").read_bytes())
+    document = Document.load(path)
+    document.save_version("one")
+    with locking.locked(path):
+        (lock,) = tmp_path.glob(".*.lock")
+        assert locking._LOCK.fullmatch(lock.name)
+    document.save()
+    assert Document.load(path).grade.versions == ("one",)
+
+
 def test_a_lock_file_of_a_dead_process_is_removed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -190,6 +190,51 @@ TEST(the_status_follows_the_file) {
     }
 }
 
+TEST(long_texts_of_a_file_are_cut_in_the_status) {
+    std::string text = sidecar_text();
+    text.replace(text.find("\"box\""), 5, '"' + std::string(3 << 20, 'x') + '"');
+    std::string versions;
+    for (int i = 0; i < 300; ++i) {
+        versions += (i ? ", " : "") + std::string("{\"name\": \"") + std::string(90, 'y') +
+                    std::to_string(i) + "\", \"edits\": {\"vertices\": [], \"stops\": []}}";
+    }
+    text.insert(text.find("\"edits\": {"), "\"versions\": [" + versions + "], ");
+    Ready scene;
+    scene.change("sidecar", write("long.p4d.json", text));
+    CHECK(scene.instance->text("status").size() < 20'000);
+    CHECK(scene.says("xxx...: frames 10-20 at 24 fps"));
+    CHECK(scene.says("yyy0', 'yyy"));
+}
+
+#if defined(__linux__)
+TEST(a_sidecar_of_a_time_to_come_is_not_read_at_each_frame) {
+    /// Bytes that this process has read from files.
+    const auto bytes_read = [] {
+        std::ifstream counts("/proc/self/io");
+        std::string name;
+        std::size_t bytes = 0;
+        counts >> name >> bytes;
+        return name == "rchar:" ? bytes : 0;
+    };
+    if (bytes_read() == 0) return;  // a container that hides it
+    const std::string text = sidecar_text() + std::string(1 << 20, ' ');
+    const std::string path = write("later.p4d.json", text);
+    age(path, -86400);
+    const Shown scene(path);
+    const std::vector<unsigned char> before = scene.render();
+    std::this_thread::sleep_for(std::chrono::milliseconds(3200));
+    scene.render();  // read once more: a second change in one tick of the clock is seen
+    const std::size_t start = bytes_read();
+    for (int i = 0; i < 10; ++i) CHECK(scene.render() == before);
+    EXPECT(bytes_read() - start < text.size(),
+           std::to_string(bytes_read() - start) + " bytes were read");
+    // A change is seen all the same.
+    write("later.p4d.json", sidecar_text(false) + std::string(1 << 20, ' '));
+    age(path, -86400);
+    CHECK(scene.render() != before);
+}
+#endif
+
 TEST(the_status_is_set_only_where_it_may_be) {
     // The strict host takes a setting anywhere else, and one in answer to a setting, for a fault.
     Shown scene;

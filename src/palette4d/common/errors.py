@@ -80,7 +80,9 @@ class SidecarError(Palette4dError):
     @property
     def message(self) -> Message:
         """ "FILE: POINTER: found X, expected Y", without the parts that are empty."""
-        parts = [part for part in (self.file, self.pointer) if part]
+        # As in the core: a file's members may have names of megabytes.
+        place = self.pointer if len(self.pointer) <= 400 else f"{self.pointer[:400]}..."
+        parts = [part for part in (self.file, place) if part]
         return Message(": ".join([*parts, f"found {self.found}, expected {self.expected}"]))
 
 

@@ -50,6 +50,11 @@ def refuse_existing(
         raise Palette4dError(
             f"{path}: found a device or a pipe, expected a file name for the output"
         )
+    if _TEMPORARY.fullmatch(path.name):
+        raise Palette4dError(
+            f"{path}: found a name that palette4d gives its temporary files, which it removes; "
+            "choose another name"
+        )
     if made is not None and path.parent.absolute() == made.absolute() and not made.exists():
         return
     if not path.parent.is_dir():

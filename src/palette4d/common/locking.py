@@ -48,7 +48,9 @@ def locked(target: Path) -> Iterator[Callable[[], None]]:
             yield held_there
         return
     deadline = time.monotonic() + LOCK_SECONDS
-    path = target.with_name(f".{target.name[:200]}.lock")
+    # File names have at most 255 bytes; two that begin alike take turns.
+    short = os.fsencode(target.name)[:200].decode("utf-8", "ignore")
+    path = target.with_name(f".{short}.lock")
     mine = f"{_computer()} {os.getpid()} {secrets.token_hex(8)}"
     while not _created(path, mine):
         owner = _content(path)

@@ -63,9 +63,8 @@ class Folder:
             )
         self.path = path
         self._by_name: dict[str, list[Path]] = {}
-        for folder, folders, files in os.walk(path):
-            folders.sort()
-            for file in _in_folder(Path(folder), sorted(files)):
+        for folder, files in _folders(path):
+            for file in _in_folder(folder, files):
                 self._by_name.setdefault(_plain(file.name), []).append(file)
 
     def find(self, names: Iterable[str]) -> Path | None:
@@ -87,6 +86,27 @@ class Folder:
                     )
                 return best[0]
         return None
+
+
+def _folders(path: Path) -> Iterator[tuple[Path, list[str]]]:
+    """Yield a folder and those below it, each with the names of its files, in order.
+
+    Unlike `os.walk` of Python 3.11 it goes as deep as paths do. Links to folders are not followed,
+    and what cannot be read is passed over.
+    """
+    left = [path]
+    while left:
+        folder = left.pop()
+        try:
+            with os.scandir(folder) as entries:
+                found = sorted(entries, key=lambda entry: entry.name)
+        except OSError:
+            continue
+        below = [Path(entry) for entry in found if entry.is_dir(follow_symlinks=False)]
+        links = {entry.name for entry in found if entry.is_symlink() and Path(entry).is_dir()}
+        no_files = links.union(one.name for one in below)
+        yield folder, [entry.name for entry in found if entry.name not in no_files]
+        left += reversed(below)
 
 
 def _in_folder(folder: Path, files: list[str]) -> Iterator[Path]:
