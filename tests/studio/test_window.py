@@ -229,7 +229,7 @@ def test_fifty_thousand_frames(
     settle(window)
     id_ = busiest(window)
     for _ in range(30):
-        window.timeline.zoom(2)
+        window.timeline.zoom(0.5)
     window.session.edit(lambda document: document.set(id_, rgb=(0.9, 0.3, 0.1)))
     settle(window)
     start, end = window.timeline.places.span
