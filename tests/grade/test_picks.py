@@ -129,19 +129,6 @@ def moving(monkeypatch: pytest.MonkeyPatch, frames: int = 6) -> Document:
 BOX = (6.0, 16.0, 34.0, 44.0)
 
 
-def test_a_window_fades_out_beyond_its_box() -> None:
-    keys = (WindowKey(0, (2, 1, 4, 3), True), WindowKey(10, (12, 1, 14, 3)))
-    weights = Window(4.0, keys).weights(0, 10, 4)
-    assert weights.shape == (4, 10)
-    assert weights.dtype == np.float32
-    assert weights[1, 2:4].tolist() == [1, 1]
-    assert weights[1, 4] == pytest.approx((1 - 0.5**2 / 16) ** 2)
-    assert weights[3, 4] == pytest.approx((1 - 2 * 0.5**2 / 16) ** 2)
-    assert weights[1, 8] == 0
-    hard = Window(0.0, keys).weights(5, 10, 4)[2].tolist()
-    assert hard == [0, 0, 0, 0, 0, 0, 0.5625, 1, 1, 0.5625]
-
-
 def test_a_window_follows_its_thing(monkeypatch: pytest.MonkeyPatch) -> None:
     document = moving(monkeypatch)
     document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
@@ -172,6 +159,19 @@ def test_a_window_follows_its_thing(monkeypatch: pytest.MonkeyPatch) -> None:
     assert pick.window == Window(2.8, (WindowKey(0, BOX, True),))
     assert document.change_pick("p1", follow=True).window != pick.window
     assert document.change_pick("p1", follow=False).window == pick.window
+
+
+def test_a_window_across_the_picture_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = moving(monkeypatch)
+    document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
+    for box in ((-1, 16, 121, 44), (6, -1, 34, 61)):
+        pick = document.set_window("p1", 0, box)
+        assert pick.window is not None
+        assert pick.window.keys == (WindowKey(0, box, True),)
+    # Beyond one side there is a thing that leaves the picture.
+    pick = document.set_window("p1", 0, (-1, 16, 34, 44))
+    assert pick.window is not None
+    assert not pick.window.keys[-1].given
 
 
 def test_a_new_range_is_followed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -212,7 +212,7 @@ def test_windows_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         ("p1", 0, (20, 44, 30), None, "expected left, top, right and bottom"),
         ("p1", 0, (20, 4, 30, float("nan")), None, "expected left, top, right and bottom"),
         ("p1", 0, BOX, -1, "found a feather of -1 pixels"),
-        ("p1", 0, None, 3, "without a box"),
+        ("p1", 0, None, None, "p1 has no window"),
     ):
         with pytest.raises(Palette4dError, match=says):
             document.set_window(id_, frame, box, feather=feather)

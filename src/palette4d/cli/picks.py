@@ -307,10 +307,10 @@ def run_area(args: argparse.Namespace) -> int:
 
 def run_window(args: argparse.Namespace) -> int:
     """Set, change or remove the window of a pick."""
-    if args.frame is None and args.feather is None and not args.none:
-        raise Palette4dError("found nothing to change, expected --frame with --box, or --feather")
     if args.frame is None and args.box is not None:
         raise Palette4dError("found --box without --frame, expected the frame of the box")
+    if args.frame is None and args.feather is None and not args.none:
+        raise Palette4dError("found nothing to change, expected --frame with --box, or --feather")
     if args.frame is not None and args.box is None and not args.none:
         raise Palette4dError("found --frame without --box, expected both")
     if args.none and args.feather is not None:
@@ -540,8 +540,14 @@ def _window(document: Document, pick: Pick, followed: bool) -> list[str]:
     if all(key.given for key in window.keys):
         low, high = pick.span(document.grade.frames)
         source = document.grade.core.clip["source"]
+        clip = document.grade.core.clip
         why = f": the clip {source!r} was not found; give it with --clip"
+        if window.spans(clip["width"], clip["height"]):
+            why = ": it reaches across the picture"
         lines[0] += "; not followed" + why * (followed and low < high)
+    else:
+        moves = max(math.dist(key.box[:2], given[0].box[:2]) for key in window.keys)
+        lines[0] += f"; followed, and moves by up to {moves:.0f} pixels"
     lost = pick.lost(document.grade.frames)
     for frame, words in zip(lost, ("until", "from"), strict=True):
         if frame is not None:

@@ -271,13 +271,14 @@ class ClipOfPicks:
     def window(self, pick: Pick, window: Window, progress: Progress | None = None) -> Window:
         """Follow a window of a pick from its given keys.
 
-        Returns it with those keys alone if the clip is missing, or if there is a single frame.
+        Returns it with those keys alone if the clip is missing, if there is a single frame, or if
+        the box reaches across the picture: what is in it is no single thing, but near and far.
         """
         given = window.given
         span = pick.span(self._frames)
         known = {key.frame: key.box for key in given.keys}
         low, high = min(span[0], *known), max(span[1], *known)
-        if low >= high or (clip := self.open()) is None:
+        if low >= high or given.spans(*self._fields["size"]) or (clip := self.open()) is None:
             return given
         keys = follow_window.boxes(
             clip,

@@ -184,6 +184,8 @@ def set_window(
             f"{id} is a hold, which has no window; expected a pick: holds keep their colours "
             "everywhere"
         )
+    if box is None and old.window is None:
+        raise Palette4dError(f"{id} has no window; expected a box, to give it one")
     grade.check_frame(frame)
     clip.check_places(frame, ())
     new = replace(old, window=_with_key(old.window, frame, box, feather))

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from palette4d.common.errors import Palette4dError
 from palette4d.grade.edits import Colour, as_colour
 
-F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 Kind = Literal["pick", "hold"]
 Toward = Literal["shift", "colour"]
@@ -110,6 +109,13 @@ class Window:
     feather: float
     keys: tuple[WindowKey, ...]
 
+    def spans(self, width: int, height: int) -> bool:
+        """Return whether a given box reaches across a picture of this size, beyond both sides."""
+        return any(
+            (left < 0 and right > width) or (top < 0 and bottom > height)
+            for left, top, right, bottom in (key.box for key in self.given.keys)
+        )
+
     def box_at(self, frame: float) -> F64:
         """Return the box at a frame, (4,)."""
         frames = [key.frame for key in self.keys]
@@ -121,18 +127,6 @@ class Window:
         """The window with the user's keys alone; all keys where none is the user's."""
         given = tuple(key for key in self.keys if key.given)
         return dataclasses.replace(self, keys=given or self.keys)
-
-    def weights(self, frame: float, width: int, height: int) -> F32:
-        """Return how much of the change each pixel of the clip gets at a frame, (h, w), 0..1.
-
-        A feather below 1 pixel is 1 pixel.
-        """
-        left, top, right, bottom = self.box_at(frame)
-        x, y = np.arange(width) + 0.5, np.arange(height) + 0.5
-        across = np.maximum(np.maximum(left - x, x - right), 0)
-        down = np.maximum(np.maximum(top - y, y - bottom), 0)
-        square = (across**2 + down[:, None] ** 2) / max(self.feather, 1) ** 2
-        return np.asarray((1 - np.minimum(square, 1)) ** 2, np.float32)
 
 
 @dataclass(frozen=True)
