@@ -247,10 +247,10 @@ public:
     using Frame = LoadedSidecar::Prepared;
     using Frames = LoadedSidecar::Frames;
 
-    /// Never destroyed: at the end of a process sidecars still go.
-    static RecentFrames& of_process() {
-        static auto* const all = new RecentFrames;
-        return *all;
+    /// Each sidecar shares it: at the end of a process, or when the node is unloaded, some go late.
+    static std::shared_ptr<RecentFrames> of_process() {
+        static const auto all = std::make_shared<RecentFrames>();
+        return all;
     }
 
     /// The frame of a sidecar, which is now the one used last.
@@ -314,9 +314,11 @@ private:
 };
 
 LoadedSidecar::LoadedSidecar(Sidecar sidecar, std::string revision)
-    : sidecar_(std::move(sidecar)), revision_(std::move(revision)) {}
+    : sidecar_(std::move(sidecar)),
+      revision_(std::move(revision)),
+      recent_(RecentFrames::of_process()) {}
 
-LoadedSidecar::~LoadedSidecar() { RecentFrames::of_process().forget(frames_); }
+LoadedSidecar::~LoadedSidecar() { recent_->forget(frames_); }
 
 std::shared_ptr<LoadedSidecar> LoadedSidecar::version(const std::string& name) {
     for (const NamedVersion& one : sidecar_.versions) {
@@ -377,13 +379,12 @@ LoadedSidecar::Key LoadedSidecar::clamped(const Key& wanted) const {
 
 std::shared_ptr<const Recolourer> LoadedSidecar::prepared(const Key& wanted) {
     const Key key = clamped(wanted);
-    RecentFrames& recent = RecentFrames::of_process();
-    const std::shared_ptr<Prepared> prepared = recent.get(frames_, key);
+    const std::shared_ptr<Prepared> prepared = recent_->get(frames_, key);
     // Only threads that want this frame wait for it.
     const std::lock_guard<std::mutex> lock(prepared->building);
     if (!prepared->recolourer) {
         prepared->recolourer = prepare(key);
-        recent.weigh(*prepared);
+        recent_->weigh(*prepared);
     }
     return prepared->recolourer;
 }

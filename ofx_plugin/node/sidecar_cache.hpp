@@ -71,6 +71,7 @@ private:
 
     const Sidecar sidecar_;
     const std::string revision_;
+    const std::shared_ptr<class RecentFrames> recent_;
     std::mutex mutex_;
     std::map<std::string, std::shared_ptr<LoadedSidecar>> versions_;  ///< those in use so far
     Frames frames_;                                                   ///< RecentFrames' alone
