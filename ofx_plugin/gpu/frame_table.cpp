@@ -172,11 +172,11 @@ void add_window(const std::optional<FrameWindow>& window, const FramePicks& pick
         return;
     }
     const ImagePlace at = image_place(place->picture, place->drawn.x1, place->drawn.y1, 1, picks);
-    const auto x = [&](float side) { return (side - at.x) / at.across + 0.5; };
-    const auto y = [&](float side) { return (side - at.y) / at.down + 0.5; };
+    const auto x = [&](float side) { return side / at.width - static_cast<double>(at.column); };
+    const auto y = [&](float side) { return static_cast<double>(at.row) + 1 - side / at.height; };
     const auto& [left, top, right, bottom] = window->box;
-    for (const double value : {x(left), y(bottom), x(right), y(top), at.across / window->feather,
-                               -at.down / window->feather}) {
+    for (const double value : {x(left), y(bottom), x(right), y(top), at.width / window->feather,
+                               at.height / window->feather}) {
         to.number(value);
     }
 }

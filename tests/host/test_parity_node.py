@@ -46,7 +46,10 @@ class Node(StrictNode):
         alpha = ("--premultiplied", int(premultiplied))
         # The reference has colours alone: a pixel's neighbours change nothing.
         alone = ("--set", "cleanUp=0")
-        return self.render(sidecar, frame, image, "--strength", strength, *alpha, *alone)
+        # A host's first row is the picture's lowest.
+        upwards = np.ascontiguousarray(image[::-1])
+        drawn = self.render(sidecar, frame, upwards, "--strength", strength, *alpha, *alone)
+        return drawn[::-1]
 
 
 @pytest.fixture

@@ -82,10 +82,9 @@ ImagePlace image_place(const Area& picture, int x, int y, int step, const FrameP
     const auto size = [](int low, int high) {
         return std::max(static_cast<double>(high) - low, 1.0);
     };
-    const double across = picks.width / size(picture.x1, picture.x2);
-    const double down = picks.height / size(picture.y1, picture.y2);
-    return {(static_cast<double>(x) - picture.x1 + 0.5) * across,
-            (static_cast<double>(picture.y2) - y - 0.5) * down, across, -step * down};
+    return {std::int64_t{x} - picture.x1, std::int64_t{picture.y2} - 1 - y, -step,
+            picks.width / size(picture.x1, picture.x2),
+            picks.height / size(picture.y1, picture.y2)};
 }
 
 int clean_up_cell(double scale) {

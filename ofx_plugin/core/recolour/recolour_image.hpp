@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 
 #include "convert/colour_conversion.hpp"
@@ -30,13 +31,19 @@ using ImageView = ImageOf<float, char>;
 
 void copy_rows(const ConstImageView& in, const ImageView& out);
 
-/// Where an image's pixels are in the clip's picture, which windows of picks need: the middle of
-/// the first pixel, and the steps to the next one and to the next row, in pixels of the clip.
+/// Where an image's pixels are in the clip's picture, which windows of picks need: the first one's
+/// column and row in the whole picture, from its top left corner; from a row to the next one, 1 or
+/// -1; and a pixel's width and height, in pixels of the clip.
 struct ImagePlace {
-    double x, y, across, down;
+    std::int64_t column, row;
+    int step;
+    double width, height;
 
-    Spot at(int column, int row) const {
-        return {static_cast<float>(x + across * column), static_cast<float>(y + down * row)};
+    /// The same for a pixel whatever image it is in.
+    Spot at(int x, int y) const {
+        const auto down = row + static_cast<std::int64_t>(step) * y;
+        return {static_cast<float>((static_cast<double>(column + x) + 0.5) * width),
+                static_cast<float>((static_cast<double>(down) + 0.5) * height)};
     }
 };
 

@@ -238,7 +238,7 @@ TEST(pictures_are_the_same_by_every_way) {
             for (const int channels : {3, 4}) {
                 const Image image = everything(203, 7, channels, 5);
                 RecolourOptions way{0.75, channels == 4, 1};
-                way.place = ImagePlace{0.5, 0.5, 1, 1};
+                way.place = ImagePlace{0, 0, 1, 1, 1};
                 Image expected(203, 7, channels), exact(203, 7, channels);
                 recolourer.apply(image.in(), expected.out(), way);
                 RecolourOptions twofold = way;
@@ -268,7 +268,7 @@ TEST(pictures_are_the_same_by_every_way) {
                     const std::size_t at = (4 * 203 + static_cast<std::size_t>(x)) *
                                            static_cast<std::size_t>(channels);
                     float pixel[4];
-                    way.place = ImagePlace{x + 0.5, 4.5, 1, 1};
+                    way.place = ImagePlace{x, 4, 1, 1, 1};
                     recolourer.apply({&image.data[at], 1, 1, channels, 16},
                                      {pixel, 1, 1, channels, 16}, way);
                     CHECK(std::memcmp(pixel, &expected.data[at], sizeof(float) * channels) == 0);
@@ -390,7 +390,7 @@ TEST(the_picture_may_have_another_size_than_the_clip) {
     }
     Image found(20, 10, 3);
     RecolourOptions way;
-    way.place = ImagePlace{5, 5, 10, 10};
+    way.place = ImagePlace{0, 0, 1, 10, 10};
     map.apply(proxy.in(), found.out(), way);
     for (int y = 0; y < 10; ++y) {
         for (int x = 0; x < 20; ++x) {
