@@ -1,6 +1,7 @@
-"""Marks of tests about what files are on Linux and macOS, and not on Windows."""
+"""Marks of tests about what files are on Linux and macOS, and not on Windows; deep folders."""
 
 import os
+from pathlib import Path
 
 import pytest
 
@@ -14,4 +15,20 @@ locks = pytest.mark.skipif(
     _WINDOWS, reason="Windows locks no temporary files: they count as left over after a day"
 )
 homes = pytest.mark.skipif(_WINDOWS, reason="Windows tells a user's folders by no variable")
+gifts = pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0,
+    reason="only root may give a file to another user",
+)
 folders = pytest.mark.skipif(_WINDOWS, reason="Windows opens no folders as files")
+
+
+def make_deep(path: Path, levels: int) -> None:
+    """Make a folder with a folder named "a" in it, and so on; paths of all of them are too long."""
+    path.mkdir(exist_ok=True)
+    handle = os.open(path, os.O_RDONLY)
+    for _ in range(levels):
+        os.mkdir("a", dir_fd=handle)
+        inner = os.open("a", os.O_RDONLY, dir_fd=handle)
+        os.close(handle)
+        handle = inner
+    os.close(handle)

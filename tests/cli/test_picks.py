@@ -388,7 +388,8 @@ def test_a_window_is_set_listed_changed_and_removed(path: str, run: Run) -> None
     assert pick["window"]["feather"] == 1
     assert {"frame": 2, "box": [13, 3, 23, 13], "given": True} in pick["window"]["keys"]
     assert json.loads(run("picks", "--json")[1])["picks"] == [pick]
-    assert "window 13,3,23,13 at frame 2; feather 1" in run("picks")[1]
+    listed = run("picks")[1]
+    assert "window 13,3,23,13 at frame 2; feather 1; followed, and moves by up to " in listed
     status, out, _ = run("window", "p1", "--frame", "4", "--box", "12,3,23,13", "--feather", "3")
     assert status == 0
     assert "window 13,3,23,13 at frame 2, 12,3,23,13 at frame 4; feather 3" in out
@@ -419,6 +420,8 @@ def test_a_window_that_is_lost_or_cannot_follow_says_so(
     assert "the window is lost from frame 3" in out
     assert "the window is lost until frame 1" in out
     assert "window p1 --frame 3 --box L,T,R,B" in out
+    out = run("window", "p1", "--frame", "2", "--box", "-2,1,30,6")[1]
+    assert "; not followed: it reaches across the picture" in out
     out = run("window", "p1", "--frame", "2", "--box", "2,1,6,4", "--no-follow")[1]
     assert "feather 0.2; not followed\n" in out
     (analysed / "clip").rename(analysed / "away")

@@ -15,7 +15,7 @@ from pathlib import Path, PureWindowsPath
 import access_lists
 import pytest
 from access_lists import for_one
-from posix_files import folders, links, locks, modes, pipes
+from posix_files import folders, gifts, links, locks, make_deep, modes, pipes
 
 from palette4d.colour.ocio_config import config_of_sidecar
 from palette4d.common import files, locking
@@ -170,7 +170,7 @@ def test_who_cannot_give_the_group_keeps_the_attributes_and_narrows_the_list(
     )
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs root")
+@gifts
 @pytest.mark.parametrize(("may", "mode"), [(True, 0o664), (False, 0o644)])
 def test_owner_and_group_are_kept_or_their_rights_go(
     old: Path, may: bool, mode: int, monkeypatch: pytest.MonkeyPatch
@@ -404,26 +404,15 @@ def test_the_next_process_removes_what_a_killed_one_left(
     assert names(old.parent) == [alike.name, old.name]
 
 
-def make_deep(path: Path) -> None:
-    path.mkdir()
-    handle = os.open(path, os.O_RDONLY)
-    for _ in range(3000):
-        os.mkdir("a", dir_fd=handle)
-        inner = os.open("a", os.O_RDONLY, dir_fd=handle)
-        os.close(handle)
-        handle = inner
-    os.close(handle)
-
-
 @pytest.fixture
 def deep_folder(tmp_path: Path) -> Iterator[Callable[[Path], None]]:
     """Makes a folder that is deeper than any path, and than Python's stack."""
-    yield make_deep
+    yield lambda path: make_deep(path, 3000)
     subprocess.run(["rm", "-rf", *tmp_path.iterdir()], check=True)
 
 
 @links
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs root")
+@gifts
 def test_what_another_user_left_stays(
     old: Path, deep_folder: Callable[[Path], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:

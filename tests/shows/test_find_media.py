@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from posix_files import links
+from posix_files import links, make_deep
 
 from palette4d.shows.find_media import Folder
 
@@ -16,13 +15,7 @@ from palette4d.shows.find_media import Folder
 @pytest.fixture
 def deep(tmp_path: Path) -> Iterator[Path]:
     """A folder that is deeper than Python's stack."""
-    handle = os.open(tmp_path, os.O_RDONLY)
-    for _ in range(1500):
-        os.mkdir("a", dir_fd=handle)
-        inner = os.open("a", os.O_RDONLY, dir_fd=handle)
-        os.close(handle)
-        handle = inner
-    os.close(handle)
+    make_deep(tmp_path, 1500)
     yield tmp_path
     subprocess.run(["rm", "-rf", tmp_path / "a"], check=True)
 

@@ -533,15 +533,14 @@ def _window(document: Document, pick: Pick, followed: bool) -> list[str]:
     """Return where a pick's window is, and from where it could not be followed."""
     if (window := pick.window) is None:
         return []
-    given = [key for key in window.keys if key.given] or [*window.keys]
+    given = window.given.keys
     boxes = [f"{','.join(f'{side:g}' for side in k.box)} at frame {k.frame:g}" for k in given[:3]]
     more = f" and {len(given) - 3} more" if len(given) > 3 else ""
     lines = [f"  window {', '.join(boxes)}{more}; feather {window.feather:g}"]
     if all(key.given for key in window.keys):
         low, high = pick.span(document.grade.frames)
-        source = document.grade.core.clip["source"]
         clip = document.grade.core.clip
-        why = f": the clip {source!r} was not found; give it with --clip"
+        why = f": the clip {clip['source']!r} was not found; give it with --clip"
         if window.spans(clip["width"], clip["height"]):
             why = ": it reaches across the picture"
         lines[0] += "; not followed" + why * (followed and low < high)
