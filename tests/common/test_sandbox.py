@@ -18,7 +18,7 @@ from confining import confines, forks
 from edits import sequence
 from farm_processes import wait_for
 
-from palette4d.common import sandbox
+from palette4d.common import sandbox, writer
 from palette4d.common.errors import Palette4dError
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
@@ -345,6 +345,28 @@ def test_an_output_that_is_being_placed_is_no_leftover(tmp_path: Path) -> None:
         finally:
             sweeper.kill()
     assert (tmp_path / "out" / "out.mov").read_bytes() == bytes([99]) * 1_000_000
+
+
+@forks
+def test_an_output_is_in_use_between_its_move_and_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At that moment another process writes beside it, and sweeps."""
+    taken, path = tmp_path / "taken", tmp_path / "out.mov"
+    taken.write_bytes(b"new")
+    other = (
+        "from pathlib import Path; from palette4d.common.files import replacing\n"
+        f"with replacing(Path({str(tmp_path / 'other.mov')!r})) as own: own.touch()"
+    )
+
+    def move(source: Path, target: Path) -> None:
+        source.replace(target)
+        subprocess.run([sys.executable, "-P", "-c", other], check=True)
+
+    monkeypatch.setattr(writer.shutil, "move", move)
+    writer._place(taken, path, False, writer.Promise.of_file(path))
+    assert path.read_bytes() == b"new"
+    assert (tmp_path / "other.mov").exists()
 
 
 @forks
