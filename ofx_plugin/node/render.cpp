@@ -84,9 +84,11 @@ struct Copied {
 Area area_of(const OfxRectI& rect) { return {rect.x1, rect.y1, rect.x2, rect.y2}; }
 
 /// Where a window of a source is cleaned up.
-CleanUp::Place clean_up_place(const Image& in, const OfxRectI& window, const Scale& scale) {
-    return {area_of(in.definition), area_of(in.bounds), area_of(window), clean_up_cell(scale.x),
-            clean_up_cell(scale.y)};
+CleanUp::Place clean_up_place(const Image& in, const OfxRectI& window, const Scale& scale,
+                              const Drawing& drawing) {
+    const double lines = clip_lines(drawing);
+    return {area_of(in.definition), area_of(in.bounds), area_of(window),
+            clean_up_cell(scale.x, lines), clean_up_cell(scale.y, lines)};
 }
 
 /// Filters what picks do in the window. The source should reach regions_of_interest() beyond it;
@@ -94,8 +96,8 @@ CleanUp::Place clean_up_place(const Image& in, const OfxRectI& window, const Sca
 std::shared_ptr<const CleanUp> cleaned_up(const Suites& suites, const Image& in,
                                           const OfxRectI& window, const NodeDrawing& drawing,
                                           const Scale& scale, const std::function<bool()>& stop) {
-    const std::shared_ptr<CleanUp> clean_up =
-        make_clean_up(drawing, {in.channels, in.premultiplied}, clean_up_place(in, window, scale));
+    const std::shared_ptr<CleanUp> clean_up = make_clean_up(
+        drawing, {in.channels, in.premultiplied}, clean_up_place(in, window, scale, drawing));
     if (!clean_up) return nullptr;
     const auto read = [&](int y, int x1, int x2, float* space) -> const float* {
         if (in.depth == Depth::kFloat) return reinterpret_cast<const float*>(in.at(x1, y));
@@ -180,8 +182,10 @@ OfxStatus regions_of_interest(const Suites& suites, OfxImageEffectHandle effect,
         Properties(suites, handle).get_double(kOfxImagePropPixelAspectRatio).value_or(1);
     // From pixels to canonical coordinates.
     const Scale scale = scale_of(in_args);
-    const double x = clean_up_support(clean_up_cell(scale.x)) * std::max(aspect, 0.0) / scale.x;
-    const double y = clean_up_support(clean_up_cell(scale.y)) / scale.y;
+    const double lines = chosen.sidecar()->edits.height;
+    const double x =
+        clean_up_support(clean_up_cell(scale.x, lines)) * std::max(aspect, 0.0) / scale.x;
+    const double y = clean_up_support(clean_up_cell(scale.y, lines)) / scale.y;
     const std::string name =
         std::string("OfxImageClipPropRoI_") + kOfxImageEffectSimpleSourceClipName;
     out_args.set_doubles(name.c_str(),
@@ -279,7 +283,7 @@ OfxStatus draw_there(const Suites& suites, OfxImageEffectHandle effect, const Pi
         const NodeDrawing& drawing = draws ? plan.setup.drawing : kAsItIs;
         const Image* const in = plan.action == Action::kClear ? nullptr : &*pictures.in;
         std::optional<CleanUp::Place> place;
-        if (in && draws) place = clean_up_place(*in, window, scale);
+        if (in && draws) place = clean_up_place(*in, window, scale, drawing);
         double took = 0;
         const bool measures = draws && measures_gpu(effect);
         problem = draws && pictures.brush

@@ -107,7 +107,8 @@ TEST(tiles_with_their_region_of_interest_are_the_whole_picture) {
 
 TEST(the_region_of_interest_is_what_the_filter_sees) {
     Picked node;
-    const int support = palette4d::clean_up_support(palette4d::clean_up_cell(1));
+    const int support =
+        palette4d::clean_up_support(palette4d::clean_up_cell(1, node.parsed.edits.height));
     const Layout layout = large(rect(0, 0, 200, 200));
     const Picture source = scene_of(layout);
     const auto whole = node.render(source, 2);
@@ -176,7 +177,8 @@ TEST(colours_far_from_picked_ones_keep_their_bits) {
         }
     }
     Picture output(layout);
-    const int support = palette4d::clean_up_support(palette4d::clean_up_cell(1));
+    const int support =
+        palette4d::clean_up_support(palette4d::clean_up_cell(1, node.parsed.edits.height));
     CHECK(node.instance->render(2, &source, output, layout.bounds) == kOfxStatOK);
     const OfxRectI near = rect(0, 0, 80, 64), far = rect(80 + support, 0, 160, 64);
     CHECK(output.pixels(near) != source.pixels(near));

@@ -51,8 +51,8 @@ def draw(image: F32, recolourer: _core.Recolourer, part: str = "frame", **option
     source = np.ones((height, width, 4), np.float32)
     source[..., :channels] = image[::-1]
     result = np.empty_like(source)
-    # 42 planes of cells of 4 x 4 pixels.
-    scratch = np.full(42 * (-(-height // 4)) * (-(-width // 4)), np.nan, np.float32)
+    # 42 planes of cells of 2 x 2 pixels, or larger ones.
+    scratch = np.full(42 * (-(-height // 2)) * (-(-width // 2)), np.nan, np.float32)
     arrays = table, grids, scratch, source, result
     pointers = [ctypes.c_void_p(a.ctypes.data) for a in arrays]
     library(part).draw(*pointers, ctypes.c_int(width), ctypes.c_int(height))

@@ -84,7 +84,7 @@ def test_a_picked_colour_has_the_bits_of_render(
     result = result_of(opened)
     assert np.array_equal(result, rendered[..., : result.shape[2]])
     y, x = place.y, place.x
-    # The clean-up averages in cells of 4 pixels: much of such a small picture.
+    # The clean-up averages around each pixel: much of such a small picture.
     assert np.abs(result[y, x] - (0.9, 0.1, 0.5)).max() < 0.15
     for x, y in ((0, 0), (159, 89), (60, 60), (101, 33), (7, 88)):  # the probe has these bits too
         probe = probe_at(session, x, y)
@@ -324,7 +324,7 @@ def test_pointing_at_a_pick_shows_what_it_takes(opened: Window, settle: Settle) 
     rest = np.abs(matte - plain).max(axis=2) > 30
     assert rest.mean() > 0.2
     dark = matte[rest]
-    assert (np.ptp(dark, axis=1) < 200).all()
+    assert (np.ptp(dark, axis=1) < 200).mean() > 0.99  # but for the edges of what it takes
     assert dark.mean() < 0.6 * plain[rest].mean()
     session.hover_over(None)
     settle(opened)

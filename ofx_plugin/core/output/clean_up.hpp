@@ -30,8 +30,9 @@ struct Area {
 /// -1) upwards, and which is the whole clip's.
 ImagePlace image_place(const Area& picture, int x, int y, int step, const FramePicks& picks);
 
-/// The side of a cell in pixels, in a picture drawn at `scale` (1: full size).
-int clean_up_cell(double scale);
+/// The side of a cell in pixels, in a picture drawn at `scale` (1: full size). `lines`: of the clip
+/// (FramePicks::lines).
+int clean_up_cell(double scale, double lines = 1);
 /// Pixels that the filter sees on each side of a pixel, at most.
 int clean_up_support(int cell);
 

@@ -265,6 +265,11 @@ std::shared_ptr<const Recolourer> cleaned_map(const Drawing& drawing) {
     return map;
 }
 
+double clip_lines(const Drawing& drawing) {
+    const std::shared_ptr<const Recolourer> map = cleaned_map(drawing);
+    return map ? map->picks().lines : 0;
+}
+
 std::shared_ptr<CleanUp> make_clean_up(const Drawing& drawing, CleanUp::Format format,
                                        const CleanUp::Place& place) {
     const std::shared_ptr<const Recolourer> map = cleaned_map(drawing);
@@ -359,9 +364,10 @@ void draw_picture(const ConstImageView& in, const ImageView& out, Drawing drawin
     if (row == 0) return;
     const bool packed = in.row_bytes == row_bytes && out.row_bytes == row_bytes;
     const auto row_at = [&](int y) { return in.row(in.height - 1 - y); };  // y counts upwards
-    if (const auto clean_up = make_clean_up(drawing, {in.channels, premultiplied},
-                                            {drawing.picture, drawing.picture, drawing.picture,
-                                             clean_up_cell(1), clean_up_cell(1)})) {
+    const int cell = clean_up_cell(1, clip_lines(drawing));
+    if (const auto clean_up =
+            make_clean_up(drawing, {in.channels, premultiplied},
+                          {drawing.picture, drawing.picture, drawing.picture, cell, cell})) {
         const unsigned processors = std::max(1u, std::thread::hardware_concurrency());
         const int strips = threads == 0 ? static_cast<int>(processors) : threads;
         clean_up->prepare([&](int y, int x1, int, float*) { return row_at(y) + x1 * in.channels; },

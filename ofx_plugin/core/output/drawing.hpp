@@ -75,6 +75,8 @@ struct Pixels {
 
 /// What the picks that are drawn and cleaned up are of; null where there are none.
 std::shared_ptr<const Recolourer> cleaned_map(const Drawing& drawing);
+/// The lines of the clip that a drawing's picks are of, for clean_up_cell().
+double clip_lines(const Drawing& drawing);
 /// The filter of a drawing, before CleanUp::prepare(); null where there is nothing to clean up.
 std::shared_ptr<CleanUp> make_clean_up(const Drawing& drawing, CleanUp::Format format,
                                        const CleanUp::Place& place);

@@ -159,6 +159,7 @@ FramePicks none_of(const Edits& edits) {
     picks.display = edits.display;
     picks.width = edits.width;
     picks.height = edits.height;
+    picks.lines = edits.height;
     return picks;
 }
 

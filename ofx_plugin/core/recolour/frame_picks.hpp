@@ -40,7 +40,8 @@ struct FramePicks {
     /// What holds leave of the changes that the palette makes; null: all.
     std::shared_ptr<const FrameMatte> left;
     std::shared_ptr<const DisplayCurve> display;
-    double width = 1, height = 1;  ///< of the clip, in pixels
+    double width = 1, height = 1;  ///< of the clip or its part, in pixels
+    double lines = 1;              ///< of the whole clip; 1: not known
 
     /// Whether a pick has one.
     bool windows() const;
