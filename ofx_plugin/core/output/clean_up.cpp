@@ -24,8 +24,8 @@ static_assert(kInBlock == PickKernels::kSize, "a block is one call of each kerne
 /// Side of a cell at full size: half of a codec's block of 8 x 8. Larger: soft edges. Smaller: the
 /// blocks of the chroma stay.
 constexpr double kCell = 4;
-/// Below so many lines cells are half as large: things are small there too.
-constexpr double kSmall = 540;
+/// Up to so many lines (CIF) cells are half as large: things are small there too.
+constexpr double kSmall = 288;
 /// Largest side, so that the windows of a block of cells end within the next block.
 constexpr int kMostCell = kInBlock / kAround;
 /// Least rows of cells in a strip: each strip also reads 4 * kAround rows of its neighbours.
@@ -90,7 +90,7 @@ ImagePlace image_place(const Area& picture, int x, int y, int step, const FrameP
 }
 
 int clean_up_cell(double scale, double lines) {
-    const double full = lines > 1 && lines < kSmall ? kCell / 2 : kCell;
+    const double full = lines > 1 && lines <= kSmall ? kCell / 2 : kCell;
     const double side = std::isfinite(scale) ? std::round(full * scale) : full;
     return static_cast<int>(std::clamp(side, 1.0, static_cast<double>(kMostCell)));
 }

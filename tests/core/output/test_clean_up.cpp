@@ -282,8 +282,8 @@ TEST(cells_shrink_with_the_picture) {
     CHECK_EQUAL(clean_up_cell(0.01), 1);
     CHECK_EQUAL(clean_up_cell(1e9), 32);
     CHECK_EQUAL(clean_up_cell(kNan), 4);
-    CHECK_EQUAL(clean_up_cell(1, 540), 4);
-    CHECK_EQUAL(clean_up_cell(1, 480), 2);
-    CHECK_EQUAL(clean_up_cell(0.5, 480), 1);
+    CHECK_EQUAL(clean_up_cell(1, 360), 4);
+    CHECK_EQUAL(clean_up_cell(1, 288), 2);
+    CHECK_EQUAL(clean_up_cell(0.5, 288), 1);
     CHECK_EQUAL(clean_up_support(4), 24);
 }
