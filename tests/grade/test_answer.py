@@ -344,6 +344,23 @@ def test_a_proposed_window_leaves_the_same_colour_elsewhere(
     assert after.notes == ()
 
 
+def test_a_window_that_leaves_little_of_the_rest_out_is_not_proposed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The same colour is all around in small parts; a window around the thing has most of them."""
+    picture = np.tile(GREY, (H, W, 1))
+    picture[4:16, 4:150] = RED  # a frame that is the thing
+    picture[4:112, 4:16] = RED
+    picture[104:116, 4:150] = RED
+    for x in (40, 70, 100, 130):
+        picture[40:80, x : x + 16] = RED
+    picture[10:110, 188:196] = RED
+    document = document_of(monkeypatch, picture)
+    found = answer(document, (10.0, 60.0))
+    assert note(found, "its colour elsewhere") is not None
+    assert all(told.window is None for told in found.notes)
+
+
 def test_a_thing_that_stands_alone_needs_no_window(monkeypatch: pytest.MonkeyPatch) -> None:
     picture = np.tile(GREY, (H, W, 1))
     picture[30:90, 20:60] = RED

@@ -432,12 +432,13 @@ def _also(it: _Thing) -> Iterator[Note]:
 
 
 def _apart(it: _Thing, change: F32) -> Iterator[Note]:
-    """Propose a window around a pick's thing, if that leaves out much and costs it little."""
+    """Propose a window around a pick's thing, if that leaves out the rest and costs it little."""
     from scipy import ndimage
 
     thing_itself = it.view.any_of([ndimage.binary_opening(it.own), *it.marks])
     box = it.view.around(thing_itself)
     after = it.view.within(it.pick, box)
-    if (change - after).mean() > OTHERS and _lost(change, after, it.own) <= COST:
+    rest = _lost(change, after, ~thing_itself)
+    if rest > 0.5 and (change - after).mean() > OTHERS and _lost(change, after, it.own) <= COST:
         note = Note("a window around the thing leaves the rest out", id=it.pick.id, window=box)
         yield note.proposing("window", after)
