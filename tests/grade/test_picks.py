@@ -277,6 +277,21 @@ def test_a_window_is_followed_when_the_clip_is_read(monkeypatch: pytest.MonkeyPa
     assert not history.done[-1].unread
 
 
+def test_a_window_that_was_not_to_be_followed_stays_when_other_things_are_read_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    document = moving(monkeypatch)
+    document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
+    document.set_window("p1", 0, BOX, follow=False)
+    before = document.grade
+    with document.one_step("edits of two programs"):
+        document.change_pick("p1", feather=9, clip=later.Unread())
+        document.change_pick("p1", until=4, clip=later.Unread())
+    trial = Document(before)
+    later.do_again(trial, document.history.done[-1], ClipOfPicks.of(before), None)
+    assert trial.grade.pick("p1").window == Window(9, (WindowKey(0, BOX, True),))
+
+
 def test_python_and_the_core_allow_as_many_enabled_picks(tmp_path: Path) -> None:
     fields = sidecar.load(SPLIT)
     made = [Pick(f"q{i}", "hold", 8, (i / 500, 0.5, 0.5)) for i in range(MOST_PICKS + 30)]

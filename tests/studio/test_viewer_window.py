@@ -376,6 +376,50 @@ def test_what_is_released_is_on_disk_before_it_is_followed(
     assert session.unfollowed == []
 
 
+def test_of_releases_that_follow_each_other_the_last_one_is_followed(
+    boxed: Window, sidecar: Path, qtbot: Any
+) -> None:
+    session = boxed.session
+    for x in (60, 62, 64):
+        drag(boxed, at(boxed, 50, 40), at(boxed, x, 40))
+        drag(boxed, at(boxed, x, 40), at(boxed, 50, 40))
+        assert session.following == 1
+    drag(boxed, at(boxed, 50, 40), at(boxed, 60, 40))
+    moved = box_of(boxed)
+    qtbot.waitUntil(lambda: not session.following, timeout=60_000)
+    assert box_of(boxed) == moved
+    assert session.unfollowed == []
+    assert [step.unread for step in session.document.history.done[-7:]] == [True] * 6 + [False]
+    # What was replaced is followed when it comes back; also from the next window.
+    session.save()
+    session.revert()
+    assert session.unfollowed == []
+    session.undo()
+    assert box_of(boxed) == BOX
+    assert session.following == 1
+    qtbot.waitUntil(lambda: not session.following, timeout=60_000)
+    own = picked(boxed).window
+    assert own is not None
+    assert any(not key.given for key in own.keys)
+    session.redo()
+    assert not session.following
+    assert box_of(boxed) == moved
+    assert [step.unread for step in session.document.history.done[-3:]] == [True, False, False]
+
+
+def test_what_a_version_keeps_is_followed_too(boxed: Window, qtbot: Any) -> None:
+    session = boxed.session
+    drag(boxed, at(boxed, 50, 40), at(boxed, 60, 40))
+    grade_steps.keep_version(session)
+    drag(boxed, at(boxed, 60, 40), at(boxed, 66, 40))
+    assert session.following == 2
+    qtbot.waitUntil(lambda: not session.following, timeout=60_000)
+    grade_steps.use_version(session, "A")
+    own = picked(boxed).window
+    assert own is not None
+    assert any(not key.given for key in own.keys)
+
+
 def waiting_calls(session: Session) -> Callable[[], bool]:
     """Keep what threads bring to the window; return what does it at last, once it is there."""
     waiting: list[Callable[[], object]] = []

@@ -3,7 +3,8 @@
 An edit with `Unread` for its clip leaves out what only the clip can tell: the path, and the matte.
 The same edit with the clip gives both. `completed` puts them into the step that was made at once,
 whatever was done, undone or kept as a version since. Until then the step is `Edit.unread`, also to
-the next program: `unread` yields the steps of one that ended too early.
+the next program: `unread` yields the steps of one that ended too early. A step that a later one
+`replaces` is read when that one is undone.
 """
 
 import dataclasses
@@ -70,14 +71,65 @@ def as_unread(history: History) -> History:
 
 
 def unread(grade: Grade, history: History) -> Iterator[tuple[Grade, Grade, Edit]]:
-    """Yield the steps that are not completed, the first one first, with the grades around them."""
-    waiting, after = [], grade
-    for step in reversed(history.done):
-        before = grade.with_state(step.inverse().apply(after.state))
-        if step.unread:
-            waiting.append((before, after, step))
+    """Yield the steps that are to be completed, the first one first, with the grades around them.
+
+    Those that a later step replaces are not.
+    """
+    waiting, after, line = [], grade, history.done
+    wanted = _wanted(line, grade.state)
+    for k in range(len(line) - 1, min(wanted, default=len(line)) - 1, -1):
+        before = grade.with_state(line[k].inverse().apply(after.state))
+        if k in wanted:
+            waiting.append((before, after, line[k]))
         after = before
     return reversed(waiting)
+
+
+def _wanted(line: Sequence[Edit], state: State) -> set[int]:
+    """Return which steps are unread, and not replaced by a later one."""
+    wanted, newer = set[int](), dict[str, set[frozenset[str]]]()
+    if not any(step.unread for step in line):
+        return wanted
+    for k in range(len(line) - 1, -1, -1):
+        if line[k].unread and not _replaced(line[k], newer, state):
+            wanted.add(k)
+        for change in _of_picks(line[k]):
+            newer.setdefault(change.id, set()).add(_fields(change))
+    return wanted
+
+
+def replaces(newer: Edit, step: Edit, state: State) -> bool:
+    """Return whether a newer step reads again all that a step reads.
+
+    Not if a version of the state has what the step made.
+    """
+    return _replaced(step, {c.id: {_fields(c)} for c in _of_picks(newer)}, state)
+
+
+def _replaced(step: Edit, newer: Mapping[str, set[frozenset[str]]], state: State) -> bool:
+    kept = [value for (kind, _), value in state.items() if kind == "version"]
+    return all(
+        None not in (change.before, change.after)
+        and any(_fields(change) <= each for each in newer.get(change.id, ()))
+        and all(version.get(change.key) != change.after for version in kept)
+        for change in _of_picks(step)
+    )
+
+
+def _of_picks(step: Edit) -> list[Change]:
+    return [change for change in step.changes if change.kind == "pick"]
+
+
+def _fields(change: Change) -> frozenset[str]:
+    """Return what a change changes of a pick."""
+    values = change.before, change.after
+    names = [field.name for field in dataclasses.fields(Pick)]
+    if None in values:
+        return frozenset([*names, "boxes"])
+    found = {name for name in names if len({getattr(pick, name) for pick in values}) > 1}
+    if len({pick.window and pick.window.keys for pick in values}) > 1:  # a feather is not read
+        found.add("boxes")
+    return frozenset(found)
 
 
 def do_again(document: Document, step: Edit, clip: OfClip, progress: Progress | None) -> None:
@@ -93,11 +145,10 @@ def do_again(document: Document, step: Edit, clip: OfClip, progress: Progress | 
             if pick.id in were and (new or pick.path):
                 reads["follow"] = True
             window, old = pick.window, were.get(pick.id)
-            kept = window is not None and old is not None and old.window == window
-            if kept:
+            if window is not None and old is not None:
                 reads["window"] = window
             document.change_pick(pick.id, **reads)
-            if window is not None and old is not None and not kept:
+            if window and old and (old.window is None or old.window.keys != window.keys):
                 key = window.given.keys[-1]
                 document.set_window(pick.id, key.frame, key.box, clip=clip, progress=progress)
 
@@ -130,7 +181,7 @@ def completed(
     """
     grade, (step, like) = grade.with_mattes(mattes), steps
     line, done = [*history.done, *reversed(history.undone)], len(history.done)
-    index = max((k for k, each in enumerate(line) if _same(each, step)), default=None)
+    index = max((k for k, each in enumerate(line) if same(each, step)), default=None)
     is_done = index is None or index < done
     now = (with_readings if is_done else _versions)(grade.state, readings)
     if index is None:  # merged with other steps, when another program wrote the file
@@ -181,7 +232,7 @@ def with_readings(state: State, readings: Readings) -> dict[Key, Any]:
     return result
 
 
-def _same(step: Edit, other: Edit) -> bool:
+def same(step: Edit, other: Edit) -> bool:
     """Return whether two steps change the same, in any order."""
     return {c.key: c for c in step.changes} == {c.key: c for c in other.changes}
 

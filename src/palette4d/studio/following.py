@@ -2,13 +2,14 @@
 
 What a gesture asks for is in the document when it ends, with a path and a matte that are not known
 yet; so it is saved at once. A thread does the same edit with the clip, one after another, and what
-it found is put into the step. It knows no toolkit.
+it found is put into the step. An edit that a newer one replaces is left: undo takes it up again. It
+knows no toolkit.
 """
 
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -65,6 +66,10 @@ class Job:
         return replace(self, before=before, after=after, step=step)
 
 
+class _Replaced(Exception):
+    """What a thread reads is not wanted any more."""
+
+
 class Follower:
     """Completes edits of a session in a thread, in the order in which they were made."""
 
@@ -78,9 +83,23 @@ class Follower:
         return len(self._jobs)
 
     def add(self, job: Job) -> None:
-        """Complete this edit when those before it are."""
+        """Complete this edit, the newest one, when those before it are that it does not replace."""
+        state, first = job.after.state, self._first
+        self._jobs = deque(
+            each for each in self._jobs if not later.replaces(job.step, each.step, state)
+        )
         self._jobs.append(job)
-        if len(self._jobs) == 1:
+        if self._first is not first:
+            self._begin()
+
+    def again(self, jobs: Iterable[Job]) -> None:
+        """Complete these edits of before too, unless they wait already."""
+        first = self._first
+        waiting = [each.step for each in self._jobs]
+        self._jobs.extend(
+            job for job in jobs if not any(later.same(job.step, step) for step in waiting)
+        )
+        if self._jobs and self._first is not first:
             self._begin()
 
     def clear(self) -> None:
@@ -101,28 +120,34 @@ class Follower:
 
         def say(done: int, total: int) -> None:
             nonlocal said
+            if self._first is not job:
+                raise _Replaced
             if time.monotonic() - said >= SAY_EVERY:
                 said = time.monotonic()
                 words = texts.FOLLOWING.format(done=done, total=total)
-                session.post(lambda: session.say(words) if self._is_first(job) else None)
+                session.post(lambda: session.say(words) if self._first is job else None)
 
         try:
             if job.edit is None:
                 later.do_again(trial, job.step, job.clip, say)
             else:
                 job.edit(trial, job.clip, say)
+        except _Replaced:
+            return
         except Exception as error:  # whatever fails, the window stays
             failed = error
             session.post(lambda: self._failed(job, failed))
         else:
             session.post(lambda: self._done(job, trial))
 
-    def _is_first(self, job: Job) -> bool:
-        """Return whether it is still wanted: another document has other edits."""
-        return bool(self._jobs) and self._jobs[0] is job
+    @property
+    def _first(self) -> Job | None:
+        """The job that is being done; no other one is wanted."""
+        jobs = self._jobs
+        return jobs[0] if jobs else None
 
     def _done(self, job: Job, done: Document) -> None:
-        if not self._is_first(job):
+        if self._first is not job:
             return
         readings = later.readings_of(done.grade, job.after)
         self._jobs.popleft()
@@ -133,7 +158,7 @@ class Follower:
         self._next()
 
     def _failed(self, job: Job, error: Exception) -> None:
-        if not self._is_first(job):
+        if self._first is not job:
             return
         self._jobs.popleft()
         self._session.say(texts.NOT_FOLLOWED.format(why=words_of(error)), "error")

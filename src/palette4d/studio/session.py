@@ -25,6 +25,7 @@ from palette4d.grade import edits, later
 from palette4d.grade.document import Document, OfClip
 from palette4d.grade.edits import Edit as Step
 from palette4d.grade.follow import Progress
+from palette4d.grade.grade import Grade
 from palette4d.grade.later import Readings, Unread
 from palette4d.media.clip import Clip, open_clip
 from palette4d.media.source_clip import find_clip
@@ -73,6 +74,8 @@ class Session(Drafts):
         self.display: Display | None = None
         self.revision = 0
         self._follower = Follower(self)
+        self._looked_at: tuple[object, object] = (None, None)
+        self._left: list[tuple[Grade, Grade, Step]] = []  # what is unread of it
 
     # -------------------------------------------------------------------------------------- files
 
@@ -284,7 +287,10 @@ class Session(Drafts):
         document = self._document
         if document is None or self.clip is None or self.following:
             return []
-        left = [step for step in document.history.done if step.unread]
+        key = document.grade, document.history
+        if any(a is not b for a, b in zip(key, self._looked_at, strict=True)):
+            self._looked_at, self._left = key, [*later.unread(*key)]
+        left = [step for _, _, step in self._left]
         return sorted({pick.id for step in left for pick in later.readers(step, document.grade)})
 
     def follow(self) -> None:
@@ -292,9 +298,10 @@ class Session(Drafts):
         document, clip = self._document, self.clip
         if document is None or clip is None:
             return
-        for before, after, step in later.unread(document.grade, document.history):
-            text = texts.FOLLOWED.format(step=step.label)
-            self._follower.add(Job(None, clip.source, text, before, after, step))
+        self._follower.again(
+            Job(None, clip.source, texts.FOLLOWED.format(step=step.label), before, after, step)
+            for before, after, step in later.unread(document.grade, document.history)
+        )
 
     def complete(
         self, steps: tuple[Step, Step], readings: Readings, mattes: Mapping[str, str]
@@ -347,12 +354,14 @@ class Session(Drafts):
         return self._dragged is not None
 
     def undo(self) -> None:
-        """Take the last edit back."""
+        """Take the last edit back, and read the clip for what it had replaced."""
         self.edit(lambda document: document.undo(), texts.UNDONE)
+        self.follow()
 
     def redo(self) -> None:
         """Do the last undone edit again."""
         self.edit(lambda document: document.redo(), texts.REDONE)
+        self.follow()
 
     def _changed(self) -> None:
         self.revision += 1
