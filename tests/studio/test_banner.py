@@ -167,6 +167,11 @@ def test_a_clip_that_states_no_colour_space_says_what_is_assumed(
     assert dialog.value("") == str(movie)
 
 
+def frames_of(settings: Path) -> object:
+    """The frames that the settings in a file have."""
+    return QSettings(str(settings), QSettings.Format.IniFormat).value("frames")
+
+
 def test_after_a_crash_the_sidecar_is_offered_again(
     window: Window, sidecar: Path, tmp_path: Path, qtbot: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -177,12 +182,12 @@ def test_after_a_crash_the_sidecar_is_offered_again(
     for folder in ("XDG_RUNTIME_DIR", "XDG_STATE_HOME"):
         monkeypatch.delenv(folder, raising=False)
     process = subprocess.Popen(
-        [sys.executable, "-m", "palette4d", "studio", str(sidecar)],
+        [sys.executable, "-m", "palette4d", "studio", str(sidecar), "--frame", "3"],
         env={"PATH": os.environ["PATH"], "HOME": str(home), "QT_QPA_PLATFORM": "offscreen"},
     )
     kept = home / ".config" / "palette4d" / "studio.conf"
     try:
-        qtbot.waitUntil(lambda: kept.exists() and "open=" in kept.read_text(), timeout=60_000)
+        qtbot.waitUntil(lambda: frames_of(kept) == {str(sidecar): 3}, timeout=60_000)
         window.settings = QSettings(str(kept), QSettings.Format.IniFormat)
         window.files.offer_crashed()
         assert not said(window)  # it is open there
@@ -193,7 +198,9 @@ def test_after_a_crash_the_sidecar_is_offered_again(
     assert sidecar.name in said(window)
     push(window, texts.REOPEN)
     assert window.session.path == sidecar
+    assert window.session.frame == 3
     assert not said(window)
     window.close()
+    assert frames_of(kept) == {}
     window.files.offer_crashed()
     assert not said(window)

@@ -77,20 +77,45 @@ class FileMenu:
         wanted = "" if path is None else str(path.absolute())
         if wanted != self._marked:
             others = [each for each in self._listed("open") if each != self._marked]
-            self.window.settings.setValue("open", [wanted, *others] if wanted else others)
-            self.window.settings.sync()
+            self._mark([wanted, *others] if wanted else others)
             self._marked = wanted
+            self.mark_frame()
+
+    def mark_frame(self) -> None:
+        """Keep where the playhead is too."""
+        if self._marked:
+            self.window.settings.setValue(
+                "frames", {**self._frames(), self._marked: self.session.frame}
+            )
+            self.window.settings.sync()
+
+    def _mark(self, opened: list[str]) -> None:
+        frames = {path: at for path, at in self._frames().items() if path in opened}
+        self.window.settings.setValue("open", opened)
+        self.window.settings.setValue("frames", frames)
+        self.window.settings.sync()
+
+    def _frames(self) -> dict[str, int]:
+        found: Any = self.window.settings.value("frames")
+        frames = found if isinstance(found, dict) else {}  # the file may hold anything
+        return {path: at for path, at in frames.items() if isinstance(at, int)}
 
     def offer_crashed(self) -> None:
         """Offer to open again what was open in a window that ended without closing."""
         marked = [each for each in self._listed("open") if each != self._marked]
         alive = [each for each in marked if is_open(each)]
-        self.window.settings.setValue("open", [*alive, *([self._marked] if self._marked else [])])
+        frames = self._frames()
+        self._mark([*alive, *([self._marked] if self._marked else [])])
         lost = next((each for each in marked if each not in alive and is_there(each)), None)
         if lost is not None:
             text = texts.CRASHED.format(name=Path(lost).name)
-            reopens = {texts.REOPEN: lambda: self.open_path(lost)}
+            reopens = {texts.REOPEN: lambda: self._reopen(lost, frames.get(lost))}
             self.window.banner.tell("crash", text, "warning", reopens)
+
+    def _reopen(self, path: str, frame: int | None) -> None:
+        self.open_path(path)
+        if frame is not None:
+            self.session.go(frame)
 
     def _listed(self, name: str) -> list[str]:
         found: Any = self.window.settings.value(name, [])

@@ -62,6 +62,8 @@ from palette4d.studio.viewer import Viewer
 
 #: Milliseconds between two looks at the file.
 TICK = 100
+#: Milliseconds for which the playhead rests before its frame is kept for *Reopen*.
+REST = 500
 #: Shows the picture before while it is down.
 COMPARE_KEY = Qt.Key.Key_C
 
@@ -133,6 +135,9 @@ class Window(QMainWindow):
         self._listener = Listener(self, self._asked_for)
         session.on("document", lambda: self._listener.listen(session.path))
         session.on("document", lambda: self.files.mark_open(session.path))
+        self._resting = QTimer(self, interval=REST, singleShot=True)
+        self._resting.timeout.connect(self.files.mark_frame)
+        session.on("frame", self._resting.start)
         self._timer = QTimer(self)
         self._timer.timeout.connect(session.tick)
         self._timer.start(TICK)
@@ -488,6 +493,7 @@ class Window(QMainWindow):
     def shut(self) -> None:
         """End all threads and close the document."""
         self._timer.stop()
+        self._resting.stop()
         self._listener.listen(None)
         self.session.play(0)
         self.viewer.preview.close()
