@@ -22,6 +22,7 @@ from palette4d.grade.grade import Grade
 from palette4d.grade.mattes import Display, Learned, learn
 from palette4d.grade.picks import ALIKE, PathKey, Pick, Window
 from palette4d.media.clip_base import describe
+from palette4d.media.proxy_clip import ProxyClip, is_proxy
 from palette4d.media.source_clip import find_clip, nearest_frame
 
 if TYPE_CHECKING:
@@ -86,6 +87,8 @@ class ClipOfPicks:
     def open(self) -> Clip | None:
         """Return the clip, or None if none was given and the sidecar's clip is not there.
 
+        A smaller copy of it is read in the size of the palette's clip, which places refer to.
+
         Raises
         ------
         Palette4dError
@@ -99,6 +102,8 @@ class ClipOfPicks:
         width, height = self._fields["size"]
         first, last, step = self._frames
         known = range(first, last + 1, step)
+        if is_proxy(clip, width, height):
+            clip = ProxyClip(clip, width, height)
         if (clip.width, clip.height) != (width, height):
             raise Palette4dError(
                 f"{clip.source} has {clip.width}x{clip.height} pixels, but the palette's clip has "

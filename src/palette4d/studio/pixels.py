@@ -3,6 +3,7 @@
 It knows no toolkit.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,9 @@ def place_between(session: Session, first: tuple[int, int], last: tuple[int, int
         session.say(texts.NO_COLOUR, "warning")
         return None
     main = colours[main_colour(colours, session.document.grade.display())].mean(axis=0)
-    return Place(session.frame, x, y, side, as_colour(main.tolist()))
+    x, y = of_palette(session, x, y)
+    side = math.ceil(side / proxy_of(session)[0])
+    return Place(session.frame, x, y, side + 1 - side % 2, as_colour(main.tolist()))
 
 
 def probe_at(session: Session, x: int, y: int) -> Probe | None:
@@ -80,6 +83,12 @@ def proxy_of(session: Session) -> tuple[float, float]:
         return 1.0, 1.0
     own = document.grade.core.clip
     return clip.width / own["width"], clip.height / own["height"]
+
+
+def of_palette(session: Session, x: float, y: float) -> tuple[int, int]:
+    """Return the pixel of the palette's clip that is in the middle of one of the shown clip."""
+    across, down = proxy_of(session)
+    return int((x + 0.5) / across), int((y + 0.5) / down)
 
 
 def _around(shape: tuple[int, ...], x: int, y: int) -> Part:

@@ -82,9 +82,9 @@ class Place:
     ----------
     frame : int
     x, y : int
-        The pixel; the box's middle.
+        The pixel, of the palette's clip; the box's middle.
     box : int
-        The box's side in pixels, odd; 1 is the pixel.
+        The box's side in these pixels, odd; 1 is the pixel.
     colour : tuple of float
         The main colour there, in the palette's code values.
     """

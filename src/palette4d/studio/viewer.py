@@ -20,7 +20,7 @@ from PySide6.QtWidgets import QWidget
 from palette4d.grade.picks import Area
 from palette4d.studio import texts
 from palette4d.studio.paint import image_of
-from palette4d.studio.pixels import place_between, probe_at, proxy_of
+from palette4d.studio.pixels import of_palette, place_between, probe_at, proxy_of
 from palette4d.studio.player import Region
 from palette4d.studio.preview import NO_PIXELS, Grade, Picture, Preview, Request
 from palette4d.studio.session import Session
@@ -362,6 +362,16 @@ class Viewer(QWidget):
         """Return the widget's point of a point of the frame, in the last pane."""
         return self.origin(self.panes()[-1][1]) + QPointF(x, y) * self.scale()
 
+    def own_point(self, x: float, y: float) -> QPointF:
+        """Return the widget's point of a point of the palette's clip, of which a proxy is shown."""
+        across, down = proxy_of(self.session)
+        return self.point_of(x * across, y * down)
+
+    @property
+    def own_scale(self) -> float:
+        """Pixels of the widget for one of the palette's clip."""
+        return self.scale() * proxy_of(self.session)[0]
+
     def fit(self) -> None:
         """Show the whole frame."""
         self.zoom = None
@@ -403,7 +413,7 @@ class Viewer(QWidget):
                 self.doing = "handle"
                 self.handles.press(point, grip)
             elif (at := self.pixel_at(point)) is not None and self.brushing(event.modifiers()):
-                self.doing, self.stroke = "stroke", [at]
+                self.doing, self.stroke = "stroke", [of_palette(self.session, *at)]
                 self.update()
             elif event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
                 self.doing, self._pan_from = "pan", QPointF(self._middle())
@@ -548,13 +558,14 @@ class Viewer(QWidget):
 
     @property
     def stroke_radius(self) -> float:
-        """Half of the brush's width in pixels of the frame, so that its width is whole."""
-        return max(1, round(2 * self.brush / self.scale())) / 2
+        """Half of the brush's width in pixels of the palette's clip; the width is whole."""
+        return max(1, round(2 * self.brush / self.own_scale)) / 2
 
     def _draw_to(self, point: QPointF) -> None:
         """Draw the stroke on; points nearer than a third of the brush are left out."""
         at = self.pixel_at(point)
         if at is not None:
+            at = of_palette(self.session, *at)
             away = math.hypot(at[0] - self.stroke[-1][0], at[1] - self.stroke[-1][1])
             if away >= max(1.0, self.stroke_radius / 3):
                 self.stroke.append(at)

@@ -205,15 +205,15 @@ class ViewerPainter:
             self._stroke(painter, viewer.stroke, viewer.stroke_radius, 110)
         if at is not None and (viewer.shows_brush or viewer.stroke):
             painter.setBrush(Qt.BrushStyle.NoBrush)
-            radius = viewer.stroke_radius * viewer.scale()
+            radius = viewer.stroke_radius * viewer.own_scale
             paint.ring(painter, lambda: painter.drawEllipse(at, radius, radius), thin=True)
 
     def _stroke(
         self, painter: QPainter, points: Sequence[tuple[float, float]], radius: float, alpha: int
     ) -> None:
         """Draw a box (one point) or a stroke of the frame."""
-        scale = self.viewer.scale()
-        line = [self.viewer.point_of(x + 0.5, y + 0.5) for x, y in points]
+        scale = self.viewer.own_scale
+        line = [self.viewer.own_point(x + 0.5, y + 0.5) for x, y in points]
         shape = QPainterPath()
         if len(line) == 1:
             half = radius * scale
@@ -243,8 +243,8 @@ class ViewerPainter:
         dashed: bool = False,
     ) -> QRectF:
         """Draw a ring or a square around pixels; return its box."""
-        point = self.viewer.point_of(x + 0.5, y + 0.5)
-        half = max(7.0, side * self.viewer.scale() / 2)
+        point = self.viewer.own_point(x + 0.5, y + 0.5)
+        half = max(7.0, side * self.viewer.own_scale / 2)
         box = QRectF(point.x() - half, point.y() - half, 2 * half, 2 * half)
         painter.setBrush(Qt.BrushStyle.NoBrush)
         draw = painter.drawRect if hold else painter.drawEllipse

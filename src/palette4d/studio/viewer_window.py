@@ -88,10 +88,8 @@ class WindowHandles:
 
     def _rect(self, box: Box) -> QRectF:
         """Return where a box of the palette's clip is in the widget."""
-        (x, y), (left, top, right, bottom) = proxy_of(self.session), box
-        return QRectF(
-            self.viewer.point_of(left * x, top * y), self.viewer.point_of(right * x, bottom * y)
-        )
+        left, top, right, bottom = box
+        return QRectF(self.viewer.own_point(left, top), self.viewer.own_point(right, bottom))
 
     def _of_clip(self, point: QPointF) -> QPointF:
         """Return a point of the widget in pixels of the palette's clip."""
