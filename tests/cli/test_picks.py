@@ -395,6 +395,8 @@ def test_a_window_is_set_listed_changed_and_removed(path: str, run: Run) -> None
     assert "window 13,3,23,13 at frame 2, 12,3,23,13 at frame 4; feather 3" in out
     assert re.search(r"takes \d+(\.\d)? % of frame 2", out)
     assert "feather 2.5" in run("window", "p1", "--feather", "2.5")[1]
+    assert "at frame 4" not in run("window", "p1", "--frame", "4", "--none")[1]
+    assert run("window", "p1", "--frame", "4", "--none")[0] == 1
     assert run("window", "p1", "--none")[0] == 0
     assert "window" not in picks_of(path)[0]
     labels = [step.label for step in Document.load(path).history.done]

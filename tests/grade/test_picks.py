@@ -154,7 +154,15 @@ def test_a_window_follows_its_thing(monkeypatch: pytest.MonkeyPatch) -> None:
     pick = document.set_window("p1", 2, (20, 16, 48, 44), follow=False)
     assert pick.window is not None
     assert [key.frame for key in pick.window.keys] == [0, 2, 5]
+    # A box that was given is taken back; the others are followed again, the last one is the window.
+    pick = document.set_window("p1", 2, None)
+    assert pick.window is not None
+    assert [key.frame for key in pick.window.given.keys] == [0, 5]
+    assert document.history.done[-1].label == "change p1: no box at frame 2"
+    assert document.set_window("p1", None, None).window is None
+    document.undo()
     document.set_window("p1", 0, None)
+    assert document.set_window("p1", 5, None).window is None
     pick = document.set_window("p1", 0, BOX, follow=False)
     assert pick.window == Window(2.8, (WindowKey(0, BOX, True),))
     assert document.change_pick("p1", follow=True).window != pick.window
@@ -216,6 +224,12 @@ def test_windows_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     ):
         with pytest.raises(Palette4dError, match=says):
             document.set_window(id_, frame, box, feather=feather)
+    document.set_window("p1", 0, BOX)
+    with pytest.raises(Palette4dError, match="no box at frame 3 that was given; expected one of 0"):
+        document.set_window("p1", 3, None)
+    with pytest.raises(Palette4dError, match="without its frame"):
+        document.set_window("p1", None, BOX)
+    document.undo()
     with pytest.raises(Palette4dError, match="without window"):
         document.pick(0, pixel=(20, 30), box=9, to="#2040c0", feather=3)
     with pytest.raises(Palette4dError, match="no window"):

@@ -249,7 +249,7 @@ def rows(hand: Hand) -> Iterator[Row]:
     def box_of() -> tuple[float, ...]:
         own = hand.pick_of("p1").window
         assert own is not None
-        return tuple(own.box_at(FRAME).tolist())
+        return tuple(own.box_at(window.session.frame).tolist())
 
     def boxed() -> list[object]:
         return ["window", "p1", "--frame", FRAME, "--box", ",".join(map(repr, box_of()))]
@@ -266,11 +266,21 @@ def rows(hand: Hand) -> Iterator[Row]:
 
     yield "a window", lambda: QTest.mouseClick(on, LEFT, pos=QPoint(6, 6)), boxed
     yield "drag the window", move_window, boxed
+    yield (
+        "another box",
+        lambda: (window.session.go(FRAME + 3), move_window()),
+        lambda: [*("window", "p1", "--frame", FRAME + 3, "--box", ",".join(map(repr, box_of())))],
+    )
+    yield (
+        "no box there",
+        lambda: (window.inspector.panel.window_rows.remove.click(), window.session.go(FRAME)),
+        lambda: ["window", "p1", "--frame", FRAME + 3, "--none"],
+    )
     yield "the feather", lambda: drag(bar, QPointF(20, 8), QPointF(60, 8)), feathered
     yield (
         "no window",
         lambda: QTest.mouseClick(on, LEFT, pos=QPoint(6, 6)),
-        lambda: ["window", "p1", "--frame", FRAME, "--none"],
+        lambda: ["window", "p1", "--none"],
     )
     yield (
         "menu: the same colour",

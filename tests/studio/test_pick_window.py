@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtTest import QTest
 from windows import FRAME, Settle, seen
 
@@ -18,6 +18,7 @@ from palette4d.grade.picks import Area, WindowKey
 from palette4d.grade.picks import Window as PickWindow
 from palette4d.studio import texts
 from palette4d.studio.pick_window import REST, WindowRows
+from palette4d.studio.timeline_menu import menu_for
 from palette4d.studio.window import Window
 
 LEFT = Qt.MouseButton.LeftButton
@@ -169,6 +170,30 @@ def test_the_numbers_are_those_of_the_playhead(
         session.go(frame)
         settle(opened)
         np.testing.assert_allclose(numbers(rows), wanted, atol=0.5)
+
+
+def test_a_box_is_removed_where_it_was_given(
+    rows: WindowRows, opened: Window, settle: Settle, qtbot: Any
+) -> None:
+    session, timeline = rows.session, opened.timeline
+    session.edit(lambda d: d.set_window("p1", 2, (10, 20, 30, 50)))
+    session.go(2)
+    settle(opened)
+    assert not rows.remove.isVisibleTo(opened)  # the only one
+    session.edit(lambda d: d.set_window("p1", 10, (50, 20, 90, 60)))
+    assert rows.remove.isVisibleTo(opened)
+    session.go(9)
+    settle(opened)
+    assert not rows.remove.isVisibleTo(opened)
+    at = QPointF(timeline.places.x_of(9), timeline.places.lane_y(0))
+    menu = menu_for(timeline, timeline.places.hit(at), at.x())
+    wanted = texts.REMOVE_BOX.format(frame=10)
+    next(entry for entry in menu.actions() if entry.text() == wanted).trigger()
+    qtbot.waitUntil(lambda: not session.following, timeout=60_000)
+    own = window_of(rows)
+    assert own is not None
+    assert [key.frame for key in own.keys if key.given] == [2]
+    assert any(not key.given for key in own.keys)  # it was followed from there
 
 
 def test_a_window_that_the_answer_proposes_is_seen_and_added(

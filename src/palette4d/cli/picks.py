@@ -221,7 +221,7 @@ def _add_change(action: Action) -> None:
 def _add_window(action: Action) -> None:
     parser = action(
         "window",
-        "ID [--frame T (--box L,T,R,B | --none)] [--feather N] [--no-follow]",
+        "ID ([--frame T] --none | [--frame T --box L,T,R,B] [--feather N]) [--no-follow]",
         "limit a pick to a box, beyond which the change fades out. The box moves with what is in "
         "it; more boxes at other frames correct it. Where it is lost it stays. --feather alone "
         "changes the feather of all frames.",
@@ -237,7 +237,11 @@ def _add_window(action: Action) -> None:
         help="left, top, right and bottom in pixels from the top left corner; they may lie "
         "outside of the picture",
     )
-    box.add_argument("--none", action="store_true", help="remove the window")
+    box.add_argument(
+        "--none",
+        action="store_true",
+        help="remove the box of this frame; without --frame the window",
+    )
     add(
         "--feather",
         type=number(0, 1e6),
@@ -320,10 +324,9 @@ def run_window(args: argparse.Namespace) -> int:
         if args.box is None and not args.none:
             document.change_pick(args.id, feather=args.feather, clip=args.clip)
         else:
-            frame = document.grade.frames[0] if args.frame is None else args.frame
             document.set_window(
                 args.id,
-                frame,
+                args.frame,
                 args.box,
                 feather=args.feather,
                 follow=args.follow,
@@ -331,7 +334,7 @@ def run_window(args: argparse.Namespace) -> int:
                 progress=progress,
             )
     document.save()
-    _print_pick(args, document, args.id, boxed=args.follow and args.box is not None)
+    _print_pick(args, document, args.id, boxed=args.follow)
     return 0
 
 

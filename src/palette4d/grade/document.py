@@ -361,7 +361,7 @@ class Document:
     def set_window(
         self,
         id: str,
-        frame: float,
+        frame: float | None,
         box: Iterable[float] | None,
         *,
         feather: float | None = None,
@@ -380,11 +380,12 @@ class Document:
         ----------
         id : str
             A pick; a hold has no window.
-        frame : float
+        frame : float or None
             A frame of the clip.
         box : (left, top, right, bottom) or None
             In pixels from the clip's top left corner; it may lie outside. It replaces a box that
-            was given at this frame. None removes the window.
+            was given at this frame. None removes that box, and without a frame the window; a
+            window without boxes goes too.
         feather : float, optional
             In pixels; 0 is a hard edge. By default it stays; that of a new window is a tenth of the
             box's shorter side. `change_pick(id, feather=…)` changes it alone.

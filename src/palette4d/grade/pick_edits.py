@@ -116,7 +116,9 @@ def pick(
     box, feather = asked.get("window"), asked.get("feather")
     if box is None and feather is not None:
         raise Palette4dError(f"found {Arg('feather')} without {Arg('window')}, expected both")
-    made = replace(made, window=_with_key(None, frame, box, feather))
+    if box is not None:
+        key = WindowKey(frame, as_box(box), given=True)
+        made = replace(made, window=_with_key(None, key, feather))
     return _add(grade, clip, made, asked, progress)
 
 
@@ -170,7 +172,7 @@ def set_window(
     grade: Grade,
     clip: ClipOfPicks,
     id: str,
-    frame: float,
+    frame: float | None,
     box: Iterable[float] | None,
     *,
     feather: float | None = None,
@@ -186,31 +188,48 @@ def set_window(
         )
     if box is None and old.window is None:
         raise Palette4dError(f"{id} has no window; expected a box, to give it one")
-    grade.check_frame(frame)
-    clip.check_places(frame, ())
-    new = replace(old, window=_with_key(old.window, frame, box, feather))
-    check(new, grade.frames)
-    if follow:
-        new = _window_followed(clip, new, progress)
-    return grade.put("pick", id, new, f"change {id}: {_window_text(new, frame)}")
-
-
-def _with_key(
-    window: Window | None, frame: float, box: Iterable[float] | None, feather: float | None
-) -> Window | None:
-    """Return a window's given keys with a box at a frame; no window without a box."""
     if box is None:
         if feather is not None:
             raise Palette4dError(
                 f"found {Arg('feather')} without a box of the window, expected both"
             )
-        return None
-    key = WindowKey(frame, as_box(box), given=True)
+        new = replace(old, window=None if frame is None else _without_key(old, frame))
+        text = _window_text(new) if new.window is None else f"no box at frame {frame:g}"
+    else:
+        if frame is None:
+            raise Palette4dError("found a box of a window without its frame, expected both")
+        grade.check_frame(frame)
+        clip.check_places(frame, ())
+        key = WindowKey(frame, as_box(box), given=True)
+        new = replace(old, window=_with_key(old.window, key, feather))
+        text = _window_text(new, frame)
+    check(new, grade.frames)
+    if follow:
+        new = _window_followed(clip, new, progress)
+    return grade.put("pick", id, new, f"change {id}: {text}")
+
+
+def _without_key(pick: Pick, frame: float) -> Window | None:
+    """Return the given keys of a pick's window but for that of a frame; None without any."""
+    assert pick.window is not None
+    given = pick.window.given.keys
+    kept = tuple(key for key in given if key.frame != frame)
+    if kept == given:
+        known = ", ".join(f"{key.frame:g}" for key in given)
+        raise Palette4dError(
+            f"the window of {pick.id} has no box at frame {frame:g} that was given; expected one "
+            f"of {known}"
+        )
+    return replace(pick.window, keys=kept) if kept else None
+
+
+def _with_key(window: Window | None, key: WindowKey, feather: float | None) -> Window:
+    """Return a window's given keys with another one."""
     if window is None:
         left, top, right, bottom = key.box
         width = round(FEATHER * min(right - left, bottom - top), 1) if feather is None else feather
         return Window(float(width), (key,))
-    keys = {each.frame: each for each in window.keys if each.given} | {frame: key}
+    keys = {each.frame: each for each in window.keys if each.given} | {key.frame: key}
     width = window.feather if feather is None else float(feather)
     return Window(width, tuple(keys[at] for at in sorted(keys)))
 

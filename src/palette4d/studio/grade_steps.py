@@ -219,9 +219,17 @@ def feather_window(session: Session, id_: str, feather: float, *, dragging: bool
 
 def remove_window(session: Session, id_: str) -> None:
     """Let a pick change all of the picture again (`window`)."""
-    frame = session.frame
     text = texts.WINDOW_REMOVED.format(id=id_)
-    session.edit(lambda document: document.set_window(id_, frame, None), text)
+    session.edit(lambda document: document.set_window(id_, None, None), text)
+
+
+def remove_box(session: Session, id_: str, frame: float) -> None:
+    """Remove the box of a pick's window at a frame, and follow it from the others (`window`)."""
+
+    def remove(document: Document, clip: OfClip | None, progress: Progress | None) -> None:
+        document.set_window(id_, frame, None, clip=clip, progress=progress)
+
+    session.edit_later(remove, texts.BOX_REMOVED.format(id=id_, frame=style.number(frame)))
 
 
 def set_fades(session: Session, id_: str, before: float, after: float) -> None:

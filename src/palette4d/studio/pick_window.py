@@ -8,6 +8,7 @@ from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
     QLabel,
+    QPushButton,
 )
 
 from palette4d.grade.picks import MOST_PIXELS, Box, Pick, Window
@@ -63,6 +64,10 @@ class WindowRows(QObject):
         self.lost.setWordWrap(True)
         self.lost.setStyleSheet(f"color: {theme.WARNING}")
         grid.addWidget(self.lost, line + 2, 0, 1, 3)
+        self.remove = QPushButton()
+        self.remove.setToolTip(texts.REMOVE_BOX_TIP)
+        self.remove.clicked.connect(self._remove_box)
+        grid.addWidget(self.remove, line + 3, 0, 1, 3, Qt.AlignmentFlag.AlignLeft)
         session.on("frame", self.refresh, panel=True)
 
     def _make_numbers(self) -> QHBoxLayout:
@@ -100,6 +105,9 @@ class WindowRows(QObject):
         ]
         self.lost.setText("\n".join(told))
         self.lost.setVisible(bool(told))
+        boxes = [] if window is None else [key.frame for key in window.given.keys]
+        self.remove.setText(texts.REMOVE_BOX.format(frame=self.session.frame))
+        self.remove.setVisible(len(boxes) > 1 and self.session.frame in boxes)
         parts = (*self._names, *self.numbers.values(), self.label, self.bar, self.feather)
         for part in parts:
             part.setVisible(window is not None)
@@ -142,6 +150,11 @@ class WindowRows(QObject):
             )
         else:
             grade_steps.remove_window(self.session, pick.id)
+
+    def _remove_box(self) -> None:
+        pick = self._picked()
+        if pick is not None:
+            grade_steps.remove_box(self.session, pick.id, self.session.frame)
 
     def _feather_moved(self, value: float) -> None:
         pick = self._picked()

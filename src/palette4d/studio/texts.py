@@ -587,6 +587,9 @@ WINDOW_LOST = (
 )
 WINDOW_SET = "window of {id} at frame {frame}"
 WINDOW_REMOVED = "{id} has no window: it changes all of the picture"
+REMOVE_BOX = "Remove the box of frame {frame}"
+REMOVE_BOX_TIP = "The window is followed from its other boxes alone"
+BOX_REMOVED = "window of {id}: no box at frame {frame}"
 FEATHER_SET = "window of {id}: a feather of {pixels} pixels"
 WHOLE_HUE = "All of its hue"
 WHOLE_HUE_TIP = "It takes every colour of its hue, like a hue qualifier"

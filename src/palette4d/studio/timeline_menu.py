@@ -39,6 +39,11 @@ def menu_for(view: "TimelineView", hit: Hit, x: float) -> QMenu:
     elif hit.what == "pick":
         pick = next(pick for pick, _ in places.lanes() if pick.id == hit.id)
         _add_pick(menu, session, pick)
+        boxes = () if pick.window is None else pick.window.given.keys
+        if len(boxes) > 1:
+            near = min((key.frame for key in boxes), key=lambda at: abs(places.x_of(at) - x))
+            text = texts.REMOVE_BOX.format(frame=style.number(near))
+            menu.addAction(text, lambda: grade_steps.remove_box(session, pick.id, near))
         menu.addAction(texts.REMOVE, lambda: grade_steps.remove(session, list(session.selection)))
         menu.addSeparator()
     elif hit.what == "band":
