@@ -10,6 +10,7 @@ from PySide6.QtCore import QEvent, QMimeData, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent, QMouseEvent
 from PySide6.QtWidgets import QWidget
 
+from palette4d.grade.grade import Grade
 from palette4d.studio.window import Window
 
 Settle = Callable[[Window], None]
@@ -26,6 +27,14 @@ def busiest(window: Window) -> str:
     shares = document.weights(player.read(frame), frame).mean(axis=(0, 1))
     at = int(np.argmax(shares))
     return palette.ends[at][int(palette.weights[at] > 0.5)]
+
+
+def edits_of(grade: Grade) -> dict[str, object]:
+    """The picks' new colours, and the boxes of their windows that were given."""
+    return {
+        pick.id: [pick.to, pick.window and [(key.frame, key.box) for key in pick.window.given.keys]]
+        for pick in grade.picks
+    }
 
 
 def seen(window: Window) -> Any:

@@ -1,7 +1,8 @@
 """A window that is used until it is killed: python killed_window.py SIDECAR SEED
 
 It prints ``released N EDITS`` when the mouse is released for the N-th time, and ``saved N`` when
-the window says that everything is saved. EDITS are the picks' new colours in the window then.
+the window says that everything is saved. EDITS are then the picks' new colours in the window, and
+where their windows were put.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ os.environ["QT_QPA_PLATFORM"] = "offscreen"
 from PySide6.QtCore import QPoint, QSettings, Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
+from windows import edits_of
 
 from palette4d.studio import texts, theme
 from palette4d.studio.session import Session
@@ -37,7 +39,7 @@ def main(sidecar: str, seed: int) -> None:
     window.resize(1200, 900)
     window.show()
     window.open_path(sidecar)
-    session, wheel = window.session, window.inspector.wheel
+    session = window.session
     released = 0
 
     def look() -> None:
@@ -60,14 +62,39 @@ def main(sidecar: str, seed: int) -> None:
         else:
             session.select(chance.choice(picks).id)
         QTest.qWait(chance.randrange(400))
-        QTest.mousePress(wheel, LEFT, pos=QPoint(68, 68))
-        for _ in range(3):
-            QTest.mouseMove(wheel, QPoint(chance.randrange(20, 116), chance.randrange(20, 116)))
-            QTest.qWait(10)
-        QTest.mouseRelease(wheel, LEFT, pos=wheel.rect().center())
+        if session.place is None and chance.random() < 0.5:
+            session.go(chance.choice(session.clip.frames))
+            drag_window(window, QPoint(chance.randrange(10, 60), chance.randrange(10, 60)))
+        else:
+            drag_colour(window, chance)
         released = number
-        say("released", number, json.dumps({p.id: p.to for p in session.document.grade.picks}))
+        say("released", number, json.dumps(edits_of(session.document.grade)))
         QTest.qWait(chance.randrange(1500))
+
+
+def drag_window(window: Window, by: QPoint) -> None:
+    """Move the window of the selected pick; without one, give it one."""
+    handles, viewer = window.viewer.handles, window.viewer
+    found = handles.rects()
+    if found is None:
+        window.inspector.panel.window_rows.on.click()
+        return
+    start = found[0].center().toPoint()
+    QTest.mousePress(viewer, LEFT, pos=start)
+    for share in (1, 2, 3):
+        QTest.mouseMove(viewer, start + by * share / 3)
+        QTest.qWait(10)
+    QTest.mouseRelease(viewer, LEFT, pos=start + by)
+
+
+def drag_colour(window: Window, chance: random.Random) -> None:
+    """Drag in the wheel."""
+    wheel = window.inspector.wheel
+    QTest.mousePress(wheel, LEFT, pos=QPoint(68, 68))
+    for _ in range(3):
+        QTest.mouseMove(wheel, QPoint(chance.randrange(20, 116), chance.randrange(20, 116)))
+        QTest.qWait(10)
+    QTest.mouseRelease(wheel, LEFT, pos=wheel.rect().center())
 
 
 if __name__ == "__main__":

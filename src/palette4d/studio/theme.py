@@ -50,7 +50,7 @@ QPushButton:pressed, QPushButton:checked, QToolButton:pressed, QToolButton:check
   background: #4a4a4a; color: {BRIGHT}; }}
 QPushButton:default {{ border-color: {FAINT}; color: {BRIGHT}; }}
 QPushButton:disabled, QToolButton:disabled {{ color: #5e5e5e; }}
-QLineEdit, QAbstractSpinBox, QComboBox, QPlainTextEdit, QTextEdit {{ background: {PIT};
+QLineEdit, QAbstractSpinBox, QComboBox, QPlainTextEdit {{ background: {PIT};
   border: 1px solid {LINE}; border-radius: 3px; padding: 2px 5px; color: {TEXT};
   selection-background-color: #5a5a5a; selection-color: {BRIGHT}; }}
 QLineEdit:focus, QSpinBox:focus, QDoubleSpinBox:focus, QComboBox:focus, QPlainTextEdit:focus
@@ -61,7 +61,7 @@ QComboBox {{ background: {RAISED}; }}
 QComboBox::drop-down {{ border: none; width: 16px; }}
 QComboBox QAbstractItemView {{ background: {PANEL}; border: 1px solid {LINE};
   selection-background-color: {LINE}; }}
-QListView, QTreeView, QTableView {{ background: {PANEL}; border: none;
+QListView, QTreeView {{ background: {PANEL}; border: none;
   selection-background-color: #454545; selection-color: {BRIGHT};
   alternate-background-color: #2a2a2a; }}
 QListView::item {{ padding: 3px 6px; }}
@@ -79,13 +79,6 @@ QScrollBar::add-page, QScrollBar::sub-page {{ background: transparent; }}
 QProgressBar {{ background: {PIT}; border: 1px solid {LINE}; border-radius: 3px; text-align: center;
   height: 12px; }}
 QProgressBar::chunk {{ background: #6a6a6a; border-radius: 2px; }}
-QSlider::groove:horizontal {{ height: 3px; background: {LINE}; border-radius: 1px; }}
-QSlider::handle:horizontal {{ width: 11px; height: 11px; margin: -4px 0; border-radius: 5px;
-  background: {ACCENT}; }}
-QCheckBox::indicator {{ width: 12px; height: 12px; border: 1px solid {FAINT}; border-radius: 2px;
-  background: {PIT}; }}
-QCheckBox::indicator:checked {{ background: {ACCENT}; }}
-QSplitter::handle {{ background: {PIT}; }}
 """
 
 
@@ -129,6 +122,8 @@ def dress(app: QApplication) -> None:
     for key in (role.WindowText, role.Text, role.ButtonText):
         palette.setColor(QPalette.ColorGroup.Disabled, key, QColor("#5e5e5e"))
     app.setPalette(palette)
+    palette.setColor(role.Window, QColor(TEXT))  # Fusion's rim of a check box is darker than this
+    app.setPalette(palette, "QCheckBox")
     app.setStyleSheet(SHEET)
 
 

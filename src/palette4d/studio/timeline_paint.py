@@ -342,7 +342,8 @@ class TimelinePainter:
             painter.setPen(paint.pen(style.RIM, 1.0))
             painter.drawRect(box)
             if weights:
-                self._paint_weight(painter, y + top, self._weight(palette, edge, weights))
+                share = self._weight(palette, edge, weights)
+                self._paint_weight(painter, y + top, layout.row_height, share)
         painter.setClipping(False)
 
     @staticmethod
@@ -350,15 +351,18 @@ class TimelinePainter:
         ids = [palette.edge_ids[edge], *(palette.ids[v] for v in palette.edges[edge])]
         return max((weights[id_] for id_ in ids if id_ in weights), default=0.0)
 
-    def _paint_weight(self, painter: QPainter, y: float, weight: float) -> None:
-        bar = QRectF(28, y + 3, (GUTTER - 36), 3)
+    @staticmethod
+    def _paint_weight(painter: QPainter, y: float, tall: float, weight: float) -> None:
+        """Draw the number above a bar; in a thin row beside it."""
+        bar, at = QRectF(28, y + 3, GUTTER - 36, 3), QRectF(26, y - 13, GUTTER - 34, 15)
+        if tall < at.height() + bar.height():
+            bar, at = QRectF(28, y - 1, 14, 3), QRectF(26, y - 7.5, GUTTER - 34, 15)
         painter.fillRect(bar, QColor(theme.LINE))
         share = float(np.clip(weight, 0, 1))
         painter.fillRect(
             QRectF(bar.left(), bar.top(), bar.width() * share, 3), QColor(style.BRIGHT)
         )
         painter.setPen(QColor(style.BRIGHT if weight >= 0.005 else theme.FAINT))
-        at = QRectF(26, y - 13, GUTTER - 34, 15)
         right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
         painter.drawText(at, right, f"{weight:.0%}".replace("-", "−"))
 
