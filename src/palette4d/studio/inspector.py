@@ -14,7 +14,6 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
     QComboBox,
-    QDoubleSpinBox,
     QGridLayout,
     QHBoxLayout,
     QLabel,
@@ -38,6 +37,7 @@ from palette4d.plotting import style
 from palette4d.studio import grade_steps, texts, theme
 from palette4d.studio.choice import Choice
 from palette4d.studio.colour_widgets import Bar, Swatch, Wheel
+from palette4d.studio.number import Number
 from palette4d.studio.pick_list import PickList, Versions
 from palette4d.studio.pick_panel import PickPanel
 from palette4d.studio.row_names import row_name
@@ -68,7 +68,6 @@ class Inspector(QWidget):
         self._tried: tuple[float, ...] = ()  # the colour that a drag shows
         self._settled: Target | None = None  # the target without the edit of a drag
         self._lch: tuple[str, Lch] | None = None
-        self._silent = False
         self._make()
         for event in ("document", "selection", "frame", "view", "clip"):
             session.on(event, self.refresh, panel=True, follows=lambda: True)
@@ -174,7 +173,7 @@ class Inspector(QWidget):
         grid.setHorizontalSpacing(4)
         grid.setVerticalSpacing(2)
         self.bars: dict[str, Bar] = {}
-        self.boxes: dict[str, QDoubleSpinBox] = {}
+        self.boxes: dict[str, Number] = {}
         for line, (name, (text, step, decimals)) in enumerate(
             {
                 "L": (texts.LIGHTNESS, 0.005, 3),
@@ -187,14 +186,8 @@ class Inspector(QWidget):
         ):
             label = QLabel(name)
             label.setToolTip(text)
-            bar, box = Bar(text, step), QDoubleSpinBox()
+            bar, box = Bar(text, step), Number(text, -1e6, 1e6, step, decimals, 60)
             bar.setToolTip(text)
-            box.setAccessibleName(text)
-            box.setDecimals(decimals)
-            box.setRange(-1e6, 1e6)
-            box.setSingleStep(step)
-            box.setKeyboardTracking(False)
-            box.setFixedWidth(60)
             box.valueChanged.connect(lambda value, name=name: self._typed(name, value))
             bar.moved.connect(lambda value, name=name: self._bar_moved(name, value))
             bar.let_go.connect(self.keep)
@@ -261,14 +254,10 @@ class Inspector(QWidget):
         self.target = targets[0] if targets else None
         if not session.dragging:
             self._settled, self._tried = self.target, ()
-        self._silent = True
-        try:
-            if not session.dragging:  # they are the same during a drag
-                self._show_words(len(session.selection))
-                self._show_ramp()
-            self._show_colour(targets[1:])
-        finally:
-            self._silent = False
+        if not session.dragging:  # they are the same during a drag
+            self._show_words(len(session.selection))
+            self._show_ramp()
+        self._show_colour(targets[1:])
 
     def _show_words(self, count: int) -> None:
         target = self.target
@@ -360,12 +349,7 @@ class Inspector(QWidget):
         ]
         for (name, value, was), own in zip(values, colours, strict=True):
             self.bars[name].show_value(float(value), float(was), *limits[name], own)
-            self._set_box(name, float(value))
-
-    def _set_box(self, name: str, value: float) -> None:
-        box = self.boxes[name]
-        if not box.lineEdit().hasFocus() or not box.lineEdit().isModified():
-            box.setValue(value)
+            self.boxes[name].show_number(float(value))
 
     def _show_ramp(self) -> None:
         document, target = self.session.document, self.target
@@ -550,11 +534,11 @@ class Inspector(QWidget):
             self.try_colour(*self._with(name, value))
 
     def _typed(self, name: str, value: float) -> None:
-        if not self._silent and self.target is not None:
+        if self.target is not None:
             self.set_colour(*self._with(name, value))
 
     def _hex_typed(self) -> None:
-        if self._silent or self.target is None or not self.hex.isModified():
+        if self.target is None or not self.hex.isModified():
             return
         self.hex.setModified(False)
         text = self.hex.text().strip()

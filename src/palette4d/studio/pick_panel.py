@@ -8,7 +8,6 @@ from PySide6.QtCore import QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import QPainter, QPixmap
 from PySide6.QtWidgets import (
     QCheckBox,
-    QDoubleSpinBox,
     QGridLayout,
     QHBoxLayout,
     QLabel,
@@ -26,6 +25,7 @@ from palette4d.plotting import style
 from palette4d.studio import grade_steps, paint, texts, theme
 from palette4d.studio.colour_widgets import Bar, Span
 from palette4d.studio.newest import Newest
+from palette4d.studio.number import Number
 from palette4d.studio.pick_window import WindowRows
 from palette4d.studio.preview import taken_share
 from palette4d.studio.screen_colours import on_screen
@@ -86,7 +86,6 @@ class PickPanel(QWidget):
         """Listen to the session."""
         super().__init__()
         self.session = session
-        self._silent = False
         self._newest = Newest("palette4d answer")
         self._waits: object = None  # what an answer was asked for
         self._known: object = None  # what the answer that is shown is for
@@ -155,20 +154,18 @@ class PickPanel(QWidget):
         grid.setHorizontalSpacing(6)
         grid.setVerticalSpacing(2)
         self.bars: dict[str, Bar] = {}
-        self.boxes: dict[str, QDoubleSpinBox] = {}
+        self.boxes: dict[str, Number] = {}
         for line, (name, text, tip, low, high, step) in enumerate(
             (
                 ("reach", texts.REACH, texts.REACH_TIP, -MOST_REACH, MOST_REACH, 0.25),
                 ("softness", texts.SOFTNESS, texts.SOFTNESS_TIP, 0.0, 1.0, 0.05),
             )
         ):
-            label, bar, box = QLabel(text), Bar(text, step), QDoubleSpinBox()
-            box.setAccessibleName(text)
-            box.setDecimals(2)
-            box.setRange(low, high)
-            box.setSingleStep(step)
-            box.setKeyboardTracking(False)
-            box.setFixedWidth(NUMBERS)
+            label, bar, box = (
+                QLabel(text),
+                Bar(text, step),
+                Number(text, low, high, step, 2, NUMBERS),
+            )
             box.valueChanged.connect(lambda value, name=name: self._typed(name, value))
             bar.moved.connect(lambda value, name=name: self._moved(name, value))
             bar.let_go.connect(self.session.drop)
@@ -195,12 +192,8 @@ class PickPanel(QWidget):
             return
         self.shape.setVisible(pick.kind == "pick")
         self.whole_hue.setVisible(pick.kind == "pick")
-        self._silent = True
-        try:
-            self._show_shape(pick)
-            self.window_rows.refresh()
-        finally:
-            self._silent = False
+        self._show_shape(pick)
+        self.window_rows.refresh()
         self._show_tool()
 
     def _show_shape(self, pick: Pick) -> None:
@@ -214,8 +207,7 @@ class PickPanel(QWidget):
         self.lightness.show_span(pick.lightness, greys)
         self.lightness_words.setText("{:.2f} – {:.2f}".format(*pick.lightness))
         for name, box in self.boxes.items():
-            if not box.lineEdit().hasFocus() or not box.lineEdit().isModified():
-                box.setValue(getattr(pick, name))
+            box.show_number(getattr(pick, name))
         self.whole_hue.setChecked(pick.whole_hue)
 
     def _show_tool(self) -> None:
@@ -236,7 +228,7 @@ class PickPanel(QWidget):
 
     def _typed(self, name: str, value: float) -> None:
         pick = self.session.picked
-        if not self._silent and pick is not None:
+        if pick is not None:
             grade_steps.shape_pick(self.session, pick.id, False, **{name: round(value, 2)})
 
     def _toggled(self, on: bool) -> None:

@@ -4,17 +4,17 @@ import numpy as np
 from PySide6.QtCore import QObject, Qt, QTimer
 from PySide6.QtWidgets import (
     QCheckBox,
-    QDoubleSpinBox,
     QGridLayout,
     QHBoxLayout,
     QLabel,
     QPushButton,
 )
 
-from palette4d.grade.picks import MOST_PIXELS, Box, Pick, Window
+from palette4d.grade.picks import MOST_PIXELS, Box, Window
 from palette4d.plotting import style
 from palette4d.studio import grade_steps, texts, theme
 from palette4d.studio.colour_widgets import Bar
+from palette4d.studio.number import Number
 from palette4d.studio.session import Session
 
 #: The width of a number, and of that beside the bar, which is as those of the panel.
@@ -40,7 +40,6 @@ class WindowRows(QObject):
     def __init__(self, session: Session, grid: QGridLayout, line: int) -> None:
         super().__init__()
         self.session = session
-        self._silent = False
         self._typed: tuple[str, float, Box] | None = None  # a box that is not followed yet
         self._resting = QTimer(self)
         self._resting.setSingleShot(True)
@@ -49,9 +48,8 @@ class WindowRows(QObject):
         self.on.setToolTip(texts.WINDOW_TIP)
         self.on.clicked.connect(self._switched)
         grid.addLayout(self._make_numbers(), line, 0, 1, 3)
-        self.label, self.bar, self.feather = QLabel(texts.FEATHER), Bar(texts.FEATHER, 1.0), _box(0)
-        self.feather.setAccessibleName(texts.FEATHER)
-        self.feather.setFixedWidth(BESIDE)
+        self.label, self.bar = QLabel(texts.FEATHER), Bar(texts.FEATHER, 1.0)
+        self.feather = Number(texts.FEATHER, 0, MOST_PIXELS, 1, 1, BESIDE)
         self.feather.valueChanged.connect(self._feather_typed)
         self.bar.moved.connect(self._feather_moved)
         self.bar.let_go.connect(session.drop)
@@ -75,13 +73,11 @@ class WindowRows(QObject):
         row.setSpacing(3)
         row.addWidget(self.on)
         row.addStretch(1)
-        self.numbers: dict[str, QDoubleSpinBox] = {}
+        self.numbers: dict[str, Number] = {}
         self._names = []
         for name, (short, what) in texts.WINDOW_NUMBERS.items():
-            label, box = QLabel(short), _box(1 if name in ("width", "height") else -MOST_PIXELS)
-            box.setAccessibleName(what)
-            box.setDecimals(0)
-            box.setFixedWidth(NUMBER)
+            least = 1 if name in ("width", "height") else -MOST_PIXELS
+            label, box = QLabel(short), Number(what, least, MOST_PIXELS, 1, 0, NUMBER)
             box.valueChanged.connect(lambda value, name=name: self._number_typed(name, value))
             label.setBuddy(box)
             for part in (label, box):
@@ -111,17 +107,13 @@ class WindowRows(QObject):
         parts = (*self._names, *self.numbers.values(), self.label, self.bar, self.feather)
         for part in parts:
             part.setVisible(window is not None)
-        self._silent = True
-        try:
-            self.on.setChecked(window is not None)
-            if window is None:
-                return
-            for name, value in self._numbers_of(window).items():
-                _show(self.numbers[name], value)
-            _show(self.feather, window.feather)
-            self.bar.show_value(window.feather, 0.0, 0.0, self._most(), GREYS)
-        finally:
-            self._silent = False
+        self.on.setChecked(window is not None)
+        if window is None:
+            return
+        for name, value in self._numbers_of(window).items():
+            self.numbers[name].show_number(value)
+        self.feather.show_number(window.feather)
+        self.bar.show_value(window.feather, 0.0, 0.0, self._most(), GREYS)
 
     def _numbers_of(self, window: Window) -> dict[str, float]:
         """Return the numbers of a window at the playhead."""
@@ -136,12 +128,8 @@ class WindowRows(QObject):
 
     # --------------------------------------------------------------------------------- what it does
 
-    def _picked(self) -> Pick | None:
-        """Return the selected pick, unless numbers are being shown."""
-        return None if self._silent else self.session.picked
-
     def _switched(self, on: bool) -> None:
-        pick = self._picked()
+        pick = self.session.picked
         if pick is None:
             return
         if on:
@@ -152,24 +140,24 @@ class WindowRows(QObject):
             grade_steps.remove_window(self.session, pick.id)
 
     def _remove_box(self) -> None:
-        pick = self._picked()
+        pick = self.session.picked
         if pick is not None:
             grade_steps.remove_box(self.session, pick.id, self.session.frame)
 
     def _feather_moved(self, value: float) -> None:
-        pick = self._picked()
+        pick = self.session.picked
         if pick is not None:
             soft = max(0.0, float(round(value)))
             grade_steps.feather_window(self.session, pick.id, soft, dragging=True)
 
     def _feather_typed(self, value: float) -> None:
-        pick = self._picked()
+        pick = self.session.picked
         if pick is not None:
             grade_steps.feather_window(self.session, pick.id, value)
 
     def _number_typed(self, name: str, value: float) -> None:
         """Show the window there, and follow it when no other number comes."""
-        pick = self._picked()
+        pick = self.session.picked
         if pick is None or pick.window is None:
             return
         x, y, width, height = {**self._numbers_of(pick.window), name: value}.values()
@@ -181,18 +169,3 @@ class WindowRows(QObject):
         typed, self._typed = self._typed, None
         if typed is not None and self.session.dragging:
             grade_steps.set_window(self.session, *typed)
-
-
-def _box(least: float) -> QDoubleSpinBox:
-    """Return a field for a number of pixels."""
-    box = QDoubleSpinBox()
-    box.setDecimals(1)
-    box.setRange(least, MOST_PIXELS)
-    box.setKeyboardTracking(False)
-    return box
-
-
-def _show(box: QDoubleSpinBox, value: float) -> None:
-    """Show a number, unless another one is being typed."""
-    if not box.lineEdit().hasFocus() or not box.lineEdit().isModified():
-        box.setValue(value)

@@ -3,13 +3,12 @@
 import functools
 import time
 
-from PySide6.QtCore import QObject, QPointF, QRectF, QSize, Qt, QTimer
+from PySide6.QtCore import QObject, QPointF, QRectF, QSignalBlocker, QSize, Qt, QTimer
 from PySide6.QtGui import QColor, QIcon, QPainter, QPixmap, QPolygonF, QResizeEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
     QButtonGroup,
     QComboBox,
-    QDoubleSpinBox,
     QHBoxLayout,
     QLabel,
     QLayout,
@@ -21,6 +20,7 @@ from PySide6.QtWidgets import (
 
 from palette4d.studio import texts, theme
 from palette4d.studio.choice import Choice
+from palette4d.studio.number import Number
 from palette4d.studio.player import Region
 from palette4d.studio.preview import Picture, Request
 from palette4d.studio.session import Session
@@ -194,7 +194,6 @@ class Transport(QWidget):
         """Make the widgets."""
         super().__init__()
         self.session, self.playback = session, playback
-        self._silent = False
         both = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
         both.setSizeConstraint(QLayout.SizeConstraint.SetNoConstraint)  # it leaves things out
         both.setContentsMargins(8, 4, 8, 4)
@@ -220,7 +219,7 @@ class Transport(QWidget):
         self.frame.setKeyboardTracking(False)
         self.frame.setAccessibleName(texts.FRAME_FIELD)
         self.frame.setFixedWidth(64)
-        self.frame.valueChanged.connect(self._typed)
+        self.frame.valueChanged.connect(session.go)
         row.addWidget(self.frame)
         self.facts = QLabel()
         self.facts.setStyleSheet(f"color: {theme.FAINT}")
@@ -288,27 +287,16 @@ class Transport(QWidget):
 
     def _number(
         self, row: QHBoxLayout, text: str, low: float, high: float, step: float, name: str
-    ) -> QDoubleSpinBox:
+    ) -> Number:
         label = QLabel(text)
         label.setStyleSheet(f"color: {theme.FAINT}")
         row.addWidget(label)
-        box = QDoubleSpinBox()
-        box.setRange(low, high)
-        box.setSingleStep(step)
-        box.setDecimals(2)
+        box = Number(text, low, high, step, 2, 54)
         box.setAlignment(Qt.AlignmentFlag.AlignRight)
-        box.setFixedWidth(54)
         box.setFont(theme.numbers_font())
-        box.setAccessibleName(text)
-        box.valueChanged.connect(
-            lambda value: None if self._silent else self.session.look(**{name: value})
-        )
+        box.valueChanged.connect(lambda value: self.session.look(**{name: value}))
         row.addWidget(box)
         return box
-
-    def _typed(self, value: int) -> None:
-        if not self._silent:
-            self.session.go(value)
 
     def _chosen(self, index: int) -> None:
         found = self.look.itemData(index)
@@ -317,12 +305,12 @@ class Transport(QWidget):
 
     def _show(self) -> None:
         session, display = self.session, self.session.display
-        self._silent = True
         first, last, step = session.frames
-        self.frame.setRange(first, last)
-        self.frame.setSingleStep(step)
-        self.exposure.setValue(session.view.exposure)
-        self.gamma.setValue(session.view.gamma)
+        with QSignalBlocker(self.frame):
+            self.frame.setRange(first, last)
+            self.frame.setSingleStep(step)
+        self.exposure.show_number(session.view.exposure)
+        self.gamma.show_number(session.view.gamma)
         self.compare[session.view.compare].setChecked(True)
         for side, version in (("before", session.view.version), ("after", session.view.after)):
             name = version if len(version) <= LONGEST_NAME else f"{version[: LONGEST_NAME - 1]}…"
@@ -349,14 +337,12 @@ class Transport(QWidget):
                 if display.known
                 else texts.AS_IS_TIP
             )
-        self._silent = False
         self._show_frame()
         self._show_playing()
 
     def _show_frame(self) -> None:
-        self._silent = True
-        self.frame.setValue(self.session.frame)
-        self._silent = False
+        with QSignalBlocker(self.frame):
+            self.frame.setValue(self.session.frame)
         if not self.session.playing:
             self._show_facts()
 
