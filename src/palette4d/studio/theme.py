@@ -123,7 +123,8 @@ def dress(app: QApplication) -> None:
         palette.setColor(QPalette.ColorGroup.Disabled, key, QColor("#5e5e5e"))
     app.setPalette(palette)
     palette.setColor(role.Window, QColor(TEXT))  # Fusion's rim of a check box is darker than this
-    app.setPalette(palette, "QCheckBox")
+    # PySide's stub asks for bytes, which PySide refuses.
+    app.setPalette(palette, "QCheckBox")  # type: ignore[arg-type]
     app.setStyleSheet(SHEET)
 
 
