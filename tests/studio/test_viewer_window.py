@@ -407,6 +407,19 @@ def test_of_releases_that_follow_each_other_the_last_one_is_followed(
     assert [step.unread for step in session.document.history.done[-3:]] == [True, False, False]
 
 
+def test_a_window_is_followed_in_the_last_of_ranges(boxed: Window, qtbot: Any) -> None:
+    session = boxed.session
+    for start in (2, 3, 4):
+        grade_steps.set_range(session, "p1", start, 9)
+    assert session.following == 2  # the first one leaves the window to be followed
+    qtbot.waitUntil(lambda: not session.following, timeout=60_000)
+    assert session.unfollowed == []
+    own = picked(boxed).window
+    assert own is not None
+    assert any(not key.given for key in own.keys)
+    assert picked(boxed).start == 4
+
+
 def test_what_a_version_keeps_is_followed_too(boxed: Window, qtbot: Any) -> None:
     session = boxed.session
     drag(boxed, at(boxed, 50, 40), at(boxed, 60, 40))
