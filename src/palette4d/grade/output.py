@@ -3,20 +3,10 @@
 The names and their meaning are those of the node's parameters, and the core draws for both.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
-from palette4d import _core
 from palette4d.common.errors import Palette4dError
-from palette4d.grade.handles import unknown
-from palette4d.grade.palette import Palette
-
-F32 = NDArray[np.float32]
-Space = Literal["input", "palette"]
 
 #: The colour space of each value of `lightness_of`, by the core's names; "auto": the picture's own.
 LIGHTNESS_OF = {
@@ -114,65 +104,3 @@ class Output:
     def in_alpha(self) -> bool:
         """Whether the output needs an alpha channel."""
         return self.kind in (*_OF_ID, "outside") and self.matte_in == "alpha"
-
-    def draw(
-        self,
-        image: F32,
-        sidecar: _core.Sidecar,
-        palette: Palette,
-        edit: _core.Recolourer,
-        *,
-        picks: Sequence[str] = (),
-        premultiplied: bool,
-        space: Space,
-        threads: int,
-    ) -> F32:
-        """Draw a frame, (h, w, 3 or 4) float32; `picks` are the ids of the picks and holds."""
-        own = sidecar.conversion if space == "input" else None
-        encoding = own.input_space if own else sidecar.clip["encoding"]
-        map = self._reader(sidecar, palette, picks) or edit
-        return _core.draw(
-            image,
-            self.kind,  # type: ignore[arg-type]  # __post_init__ has checked it
-            map,
-            original=palette.rgb,
-            edited=palette.edited,
-            strength=self.strength,
-            keep_lightness=self.keep_lightness,
-            lightness=_core.luminance_weights(LIGHTNESS_OF[self.lightness_of] or encoding),
-            mix=self.mix,
-            matte_in_alpha=self.in_alpha,
-            outside_at=self.outside_at,
-            clean_up=self.clean_up,
-            premultiplied=premultiplied,
-            threads=threads,
-            conversion=own.steps if own else None,
-        )
-
-    def _reader(
-        self, sidecar: _core.Sidecar, palette: Palette, picks: Sequence[str]
-    ) -> _core.Recolourer | None:
-        """Return what draws a matte; None without one."""
-        polytope, edits, frame = sidecar.polytope, sidecar.edits, palette.frame
-        matte = None
-        if self.kind == "pick":
-            if self.id not in picks:
-                known = f"expected {' or '.join(picks)}" if picks else "there are none"
-                raise Palette4dError(f"there is no pick or hold {self.id!r}; {known}")
-            matte, edited = sidecar.pick_matte_at(self.id, frame), palette.rgb
-        elif self.kind == "outside":
-            edited = _core.surface_reader(_core.slice_at(polytope, frame))
-        elif self.kind == "weight":
-            ids = [*polytope.vertex_ids, *(stop["id"] for stop in edits.stops)]
-            if self.id in picks:
-                raise Palette4dError(
-                    f"found {self.show!r}, expected the id of a vertex or stop; the matte of a "
-                    f"pick is 'pick:{self.id}'"
-                )
-            if self.id not in ids:
-                raise unknown(self.id, "vertex or stop", ids)
-            slice = _core.slice_at(polytope, frame)
-            edited = _core.weight_reader(polytope, edits, slice, self.id)
-        else:
-            return None
-        return _core.Recolourer(palette.rgb, edited, palette.faces, picks=matte)

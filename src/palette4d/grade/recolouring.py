@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.grade.grade import Grade
-from palette4d.grade.output import Output
+from palette4d.grade.output import LIGHTNESS_OF, Output
+from palette4d.grade.palette import Palette
 
 F32 = NDArray[np.float32]
 
@@ -56,20 +57,50 @@ def recolour(grade: Grade, image: F32, frame: float, **how: Unpack[Drawing]) -> 
     output = Output(**drawing)
     pixels = _checked_image(image)
     palette = grade.palette(frame)
-    _conversion(grade, space)  # checks the space
-    recolourer = _core.Recolourer(
-        palette.rgb, palette.edited, palette.faces, picks=grade.core.picks_at(palette.frame)
-    )
-    return output.draw(
+    conversion = _conversion(grade, space)
+    encoding = conversion.input_space if conversion else grade.encoding
+    return _core.draw(
         pixels,
-        grade.core,
-        palette,
-        recolourer,
-        picks=[pick.id for pick in grade.picks],
+        output.kind,  # type: ignore[arg-type]  # Output has checked it
+        _map(grade, palette, output),
+        original=palette.rgb,
+        edited=palette.edited,
+        strength=output.strength,
+        keep_lightness=output.keep_lightness,
+        lightness=_core.luminance_weights(LIGHTNESS_OF[output.lightness_of] or encoding),
+        mix=output.mix,
+        matte_in_alpha=output.in_alpha,
+        outside_at=output.outside_at,
+        clean_up=output.clean_up,
         premultiplied=premultiplied,
-        space=space,
         threads=threads,
+        conversion=conversion.steps if conversion else None,
     )
+
+
+def _map(grade: Grade, palette: Palette, output: Output) -> _core.Recolourer:
+    """Return what moves colours: the edit, or what a matte is read from."""
+    core, frame, edited = grade.core, palette.frame, palette.edited
+    ids, picks = [pick.id for pick in grade.picks], None
+    if output.kind == "pick":
+        if output.id not in ids:
+            known = f"expected {' or '.join(ids)}" if ids else "there are none"
+            raise Palette4dError(f"there is no pick or hold {output.id!r}; {known}")
+        edited, picks = palette.rgb, core.pick_matte_at(output.id, frame)
+    elif output.kind == "outside":
+        edited = _core.surface_reader(_core.slice_at(core.polytope, frame))
+    elif output.kind == "weight":
+        if output.id in ids:
+            raise Palette4dError(
+                f"found {output.show!r}, expected the id of a vertex or stop; the matte of a "
+                f"pick is 'pick:{output.id}'"
+            )
+        grade.setting(output.id)  # refuses unknown ids
+        slice = _core.slice_at(core.polytope, frame)
+        edited = _core.weight_reader(core.polytope, core.edits, slice, output.id)
+    else:
+        picks = core.picks_at(frame)
+    return _core.Recolourer(palette.rgb, edited, palette.faces, picks=picks)
 
 
 def matte(grade: Grade, image: F32, frame: float, show: str, **how: Unpack[Matting]) -> F32:
@@ -94,7 +125,7 @@ def weights(
     def row(y: int) -> None:
         points: NDArray[Any] = colours[y]
         if conversion is not None:
-            points = conversion.to_palette(points)
+            points = conversion.steps.to_palette(points)
         result[y], _ = _core.palette_weights(points, palette.rgb, palette.faces)
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -102,11 +133,10 @@ def weights(
     return result
 
 
-def _conversion(grade: Grade, space: str) -> _core.ColourConversion | None:
+def _conversion(grade: Grade, space: str) -> _core.ClipConversion | None:
     if space not in ("input", "palette"):
         raise Palette4dError(f"found the space {space!r}, expected 'input' or 'palette'")
-    own = grade.analysed.conversion
-    return None if own is None or space == "palette" else own.steps
+    return grade.analysed.conversion if space == "input" else None
 
 
 def _checked_image(image: F32) -> F32:
