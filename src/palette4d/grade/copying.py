@@ -8,7 +8,7 @@ again from the target's clip: there their colour is, connected, or they are not 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,8 +19,9 @@ from palette4d.common.arguments import frames_between
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import same_file
 from palette4d.grade import recolouring
+from palette4d.grade.clip_colours import ClipColours
 from palette4d.grade.clip_of_picks import ClipOfPicks
-from palette4d.grade.edits import VISIBLE, Colour, Key, Setting, as_colour, new_id
+from palette4d.grade.edits import VISIBLE, Colour, Key, Kind, Setting, as_colour, new_id
 from palette4d.grade.grade import Grade
 from palette4d.grade.keyframes import needed
 from palette4d.grade.pick_edits import taken
@@ -31,6 +32,8 @@ F64 = NDArray[np.float64]
 Time = Literal["relative"] | float
 Convert = Callable[[F64], F64]
 
+#: The edits that the handles' grade is made of.
+HANDLES: tuple[Kind, ...] = ("handle", "ramp")
 #: Smaller changes of a handle, in code values, are treated as zero: floats round by as much.
 LEAST = 1e-6
 #: Distance in code values from the source's palette above which a colour is not in its clip.
@@ -86,15 +89,11 @@ class Fit:
                 f"; {self.foreign:.0%} of the clip's colours are not in the other clip's palette"
             )
         if self.left_out:
-            text += (
-                f"; not copied, since nothing connected has the colour here: "
-                f"{', '.join(self.left_out)}"
-            )
+            why = "nothing connected has the colour here"
+            text += f"; not copied, since {why}: {', '.join(self.left_out)}"
         if self.everywhere:
-            text += (
-                f"; without a window, since that is a place in the other clip: "
-                f"{', '.join(self.everywhere)}"
-            )
+            why = "that is a place in the other clip"
+            text += f"; without a window, since {why}: {', '.join(self.everywhere)}"
         return text
 
 
@@ -154,7 +153,7 @@ def copied(
     if not source.edited:
         raise Palette4dError(f"{source.name} has no edits; expected a graded palette to copy from")
     match = _match(target, source, time)
-    state = dict(_handles(target, _grade(match, _handles_of(source))))
+    state = dict(_handles(target, _grade(match, source.only(*HANDLES))))
     kept, _ = with_active_kept(target, "before copy")
     after = kept.with_state({**kept.of_kind("version", "note", "lock"), **state})
     picks = (_pick(match, pick, same_clip) for pick in source.picks)
@@ -166,21 +165,15 @@ def copied(
         if pick.window and pick.id in copies and not copies[pick.id].window
     ]
     label = f"copy the grade of {source.members['clip']['name']}"
-    found = replace(
-        fit(after, source, time), left_out=tuple(left_out), everywhere=tuple(everywhere)
-    )
-    return after.labelled(label), found
-
-
-def _handles_of(grade: Grade) -> Grade:
-    """Return a grade with the edits of the handles alone."""
-    return grade.only("handle", "ramp")
+    measured = fit(after, source, time)
+    whole = replace(measured, left_out=tuple(left_out), everywhere=tuple(everywhere))
+    return after.labelled(label), whole
 
 
 def fit(target: Grade, source: Grade, time: Time = "relative") -> Fit:
     """Measure how near the handles' grade is to that of another palette on its colours."""
     match = _match(target, source, time)
-    target, source = _handles_of(target), _handles_of(source)
+    target, source = target.only(*HANDLES), source.only(*HANDLES)
     graded = _grade(match, source)
     into, _ = match.conversions
     figures = []
@@ -190,17 +183,9 @@ def fit(target: Grade, source: Grade, time: Time = "relative") -> Fit:
         palette = source.palette(match.there(frame))
         there = colours if into is None else into(colours)
         _, distances = _core.palette_weights(there, palette.rgb, palette.faces)
-        figures.append(
-            np.column_stack(
-                [
-                    weights,
-                    np.abs(expected - colours).max(axis=1),
-                    np.abs(result - expected).max(axis=1),
-                    distances > NEAR,
-                ]
-            )
-        )
-    weight, change, off, foreign = np.vstack(figures).T
+        changes = [np.abs(step).max(axis=1) for step in (expected - colours, result - expected)]
+        figures.append(np.array([weights, *changes, distances > NEAR]))
+    weight, change, off, foreign = np.hstack(figures)
     order = np.argsort(off, kind="stable")
     reached = np.cumsum(weight[order]) / weight.sum()
     worst = off[order][min(int(np.searchsorted(reached, 0.99)), len(off) - 1)]
@@ -258,17 +243,12 @@ def _handles(target: Grade, graded: Callable[[F64, float], F64]) -> Iterator[tup
         palette = target.palette(frame_at)
         after = graded(palette.rgb, frame_at)
         for id_, colour, new in zip(palette.ids, palette.rgb, after, strict=True):
-            if id_ not in vertices:
-                before_at.setdefault(id_, []).append((float(frame_at), colour, new))
+            before_at.setdefault(id_, []).append((float(frame_at), colour, new))
     for edge in polytope["edges"]:
-        samples = before_at.get(edge["id"], [])
-        ends = [vertices[edge[end]] for end in ("from", "to")]
-        times = [ends[0]["frame"], *(frame for frame, _, _ in samples), ends[1]["frame"]]
-        changes = [
-            shifts[edge["from"]],
-            *(new - old for _, old, new in samples),
-            shifts[edge["to"]],
-        ]
+        samples, (start, end) = before_at.get(edge["id"], []), (edge["from"], edge["to"])
+        inner = [frame for frame, _, _ in samples]
+        times = [vertices[start]["frame"], *inner, vertices[end]["frame"]]
+        changes = [shifts[start], *(new - old for _, old, new in samples), shifts[end]]
         for index in needed(times, np.array(changes), (), VISIBLE)[1:-1]:
             frame, _, new = samples[index - 1]
             id_ = new_id("s", taken)
@@ -288,10 +268,10 @@ def _pick(match: Match, pick: Pick, same_clip: bool) -> Pick | None:
         first, _, step = match.target.frames
         return first + step * round((match.back(frame) - first) / step)
 
-    copy = replace(pick, path=(), matte=None)
+    always: dict[str, Any] = {"start": None, "until": None, "fade": 0.0, "fade_out": None}
+    copy = replace(pick, path=(), matte=None, **always)
     if not same_clip:
         copy = replace(copy, pixel=None, box=None, areas=(), window=None)
-    copy = replace(copy, start=None, until=None, fade=0.0, fade_out=None)
     if pick.to is not None:
         copy = replace(copy, to=colour(pick.to))
     if match.time == "relative":
@@ -318,15 +298,13 @@ def _pick(match: Match, pick: Pick, same_clip: bool) -> Pick | None:
 
 def _colours(target: Grade) -> Iterator[tuple[float, F64, F64]]:
     """Yield frames with colours of the target's clip and their weights."""
-    stored = target.members.get("colours")
-    if stored:
-        for entry in stored:
-            rows = np.array(entry["rgbw"], dtype=np.float64).reshape(-1, 4)
-            if len(rows):
-                yield float(entry["frame"]), rows[:, :3], rows[:, 3]
+    stored = ClipColours(target.core.polytope, target.members)
+    for frame, rows in zip(stored.frames, stored.colours, strict=True):
+        yield float(frame), rows[:, :3], rows[:, 3]
+    if stored.frames:
         return
     # Without the clip's colours: even mixtures of the palette's colours.
-    for frame in np.unique(np.linspace(*target.frames[:2], 9)):
-        rgb = target.palette(float(frame)).rgb
+    for time in np.unique(np.linspace(*target.frames[:2], 9)).tolist():
+        rgb = target.palette(time).rgb
         pairs = [(a + b) / 2 for i, a in enumerate(rgb) for b in rgb[i + 1 :]] or [*rgb]
-        yield float(frame), np.array(pairs), np.ones(len(pairs))
+        yield time, np.array(pairs), np.ones(len(pairs))

@@ -9,7 +9,7 @@ import os
 from collections.abc import Generator, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, Unpack
+from typing import Any, Literal, TypeVar, Unpack
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
@@ -43,6 +43,7 @@ from palette4d.grade.sidecar import OnEdits
 PathLike = str | os.PathLike[str]
 #: A clip, or what stands for it.
 OfClip = PathLike | ClipOfPicks
+Made = TypeVar("Made")
 
 
 class Document:
@@ -135,6 +136,12 @@ class Document:
         step = edits.difference(self.grade.state, after.state, after.label).undoable()
         self.grade, self.history = after, self.history.with_step(step)
 
+    def _made(self, edit: tuple[Grade, Made]) -> Made:
+        """Go on with the grade after an edit; return what it made."""
+        after, made = edit
+        self._take(after)
+        return made
+
     @contextlib.contextmanager
     def one_step(self, label: str) -> Generator[None]:
         """Make all edits in a ``with`` block one step; an error in it reverts them all."""
@@ -176,9 +183,7 @@ class Document:
         An existing stop at that time gets the colour.
         """
         new = self.grade.checked(rgb, any_value)
-        after, id_ = handle_edits.stop(self.grade, edge, frame, new)
-        self._take(after)
-        return id_
+        return self._made(handle_edits.stop(self.grade, edge, frame, new))
 
     def set_near(
         self,
@@ -216,9 +221,9 @@ class Document:
             The nearest palette colour is more than 0.25 away; the message names the palette colours
             that `near` is mixed from.
         """
-        after, nearest = handle_edits.set_near(self.grade, near, frame=frame, anyway=anyway, **how)
-        self._take(after)
-        return nearest
+        return self._made(
+            handle_edits.set_near(self.grade, near, frame=frame, anyway=anyway, **how)
+        )
 
     def move(self, stop: str, *, frame: float) -> None:
         """Move a stop in time, within its edge."""
@@ -253,9 +258,7 @@ class Document:
         tuple of str
             The vertices and stops that changed.
         """
-        after, changed = handle_edits.adjust(self.grade, id, track=track, frame=frame, **how)
-        self._take(after)
-        return changed
+        return self._made(handle_edits.adjust(self.grade, id, track=track, frame=frame, **how))
 
     def reset(self, id: str | None = None) -> None:
         """Reset a vertex to its original colour, remove a stop, or (None) reset everything.
@@ -318,9 +321,8 @@ class Document:
         Palette4dError
             A value is out of range, or the clip does not fit.
         """
-        after, made = pick_edits.pick(self.grade, self._clip(clip), frame, progress, **asked)
-        self._take(after)
-        return made
+        own = self._clip(clip)
+        return self._made(pick_edits.pick(self.grade, own, frame, progress, **asked))
 
     def hold(
         self,
@@ -331,9 +333,8 @@ class Document:
         **asked: Unpack[When],
     ) -> Pick:
         """Keep the colour of an object as it is, whatever picks and handles do; as `pick`."""
-        after, made = pick_edits.hold(self.grade, self._clip(clip), frame, progress, **asked)
-        self._take(after)
-        return made
+        own = self._clip(clip)
+        return self._made(pick_edits.hold(self.grade, own, frame, progress, **asked))
 
     def correct_path(
         self,
@@ -446,9 +447,7 @@ class Document:
         str or None
             The name that an older version of this name has now, such as "former NAME".
         """
-        after, kept = versions.save_version(self.grade, name)
-        self._take(after)
-        return kept
+        return self._made(versions.save_version(self.grade, name))
 
     def use_version(self, name: str) -> str | None:
         """Make the edits of a version the active edits, as one step.
@@ -460,9 +459,7 @@ class Document:
         str or None
             The name of the new version, such as "before NAME".
         """
-        after, kept = versions.use_version(self.grade, name)
-        self._take(after)
-        return kept
+        return self._made(versions.use_version(self.grade, name))
 
     def remove_version(self, name: str) -> None:
         """Remove a version; `undo` brings it back."""
@@ -526,9 +523,7 @@ class Document:
             The source has no edits, the frame is outside of its clip, or its colour space cannot be
             converted.
         """
-        after, fit = copying.copied(self.grade, source.grade, self._clip(clip), time)
-        self._take(after)
-        return fit
+        return self._made(copying.copied(self.grade, source.grade, self._clip(clip), time))
 
     # ----------------------------------------------------------------------------------- pictures
 
@@ -606,8 +601,7 @@ class Document:
 
     def fields(self) -> Fields:
         """Return the members of the sidecar that `save` would write (docs/sidecar.md)."""
-        members = self.grade.fields(self.history.done, self.history.undone)
-        plain: Fields = _core.plain(members)
+        plain: Fields = _core.plain(self.grade.fields(self.history.done, self.history.undone))
         return plain
 
     def save(self, path: PathLike | None = None, *, on_edits: OnEdits = "refuse") -> None:

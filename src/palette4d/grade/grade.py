@@ -322,7 +322,10 @@ class Grade:
         """Return the frame of a vertex or stop; for an edge, the frame that is given."""
         if id in self.handles.edges:
             if frame is None:
-                raise self.handles.needs_frame(id)
+                raise Palette4dError(
+                    f"{id} is an edge, whose colour changes in time; give the frame at which it "
+                    f"gets one as {Arg('frame')}"
+                )
             return frame
         setting = self.settings.get(id or "")
         if setting is not None and setting.frame is not None:

@@ -129,11 +129,8 @@ def set_near(
 def _share(grade: Grade, vertex: str, edge: str, frame: float) -> float:
     """Return the weight, 0..1, of an end of an edge in the edge's displacement at a frame."""
     own: float = grade.handles.vertex(vertex)["frame"]
-    ends = grade.handles.edges[edge]
-    knots: list[float] = [grade.handles.vertex(ends[end])["frame"] for end in ("from", "to")]
-    stops = [stop for stop in grade.settings.values() if stop.edge == edge]
-    knots += [stop.frame for stop in stops if stop.frame is not None]
-    nearest: float = min(abs(knot - own) for knot in knots if knot != own)
+    knots = colour_moves.knots_of(grade.handles, grade.settings, edge)
+    nearest = min(abs(knot - own) for knot, _ in knots if knot != own)
     return max(0.0, 1 - abs(frame - own) / nearest)
 
 

@@ -4,7 +4,7 @@ import difflib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from palette4d.common.errors import Arg, Palette4dError
+from palette4d.common.errors import Palette4dError
 
 
 class Handles:
@@ -30,13 +30,6 @@ class Handles:
                 f"{edge['from']} and {edge['to']} it has a colour only at a frame: give it a stop"
             )
         raise unknown(id_, "vertex or stop", dict.fromkeys([*self.vertices, *others]))
-
-    def needs_frame(self, edge: str) -> Palette4dError:
-        """Return the error for an edge without a frame."""
-        return Palette4dError(
-            f"{edge} is an edge, whose colour changes in time; give the frame at which it gets "
-            f"one as {Arg('frame')}"
-        )
 
     def check_inside(self, edge: str, frame: float) -> None:
         """Refuse a stop's place that is not strictly between the ends of an edge."""
