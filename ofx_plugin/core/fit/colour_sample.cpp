@@ -16,27 +16,7 @@ constexpr std::size_t kAxes = 48;  // directions that find the surface
 constexpr std::uint64_t kGoldenRatio = 0x9E3779B97F4A7C15ull;  // its fraction, times 2^64
 
 /// The highest bit in which two keys differ; keys are never equal.
-int highest_difference(std::uint64_t a, std::uint64_t b) {
-    std::uint64_t x = a ^ b;
-    int bit = 0;
-    for (int step = 32; step; step /= 2)
-        if (x >> step) {
-            x >>= step;
-            bit += step;
-        }
-    return bit;
-}
-
-/// The same within a block, where only the lower bits differ.
-int highest_difference_within(std::uint64_t a, std::uint64_t b) {
-    static const auto highest = [] {
-        std::array<std::uint8_t, 1 << kBlockBits> bits{};
-        for (std::size_t x = 2; x < bits.size(); ++x)
-            bits[x] = static_cast<std::uint8_t>(bits[x / 2] + 1);
-        return bits;
-    }();
-    return highest[static_cast<std::size_t>(a ^ b)];
-}
+int highest_difference(std::uint64_t a, std::uint64_t b) { return 63 - __builtin_clzll(a ^ b); }
 
 /// The cost of a group that spans bits up to `bit` of its key: the logarithm of its width. One more
 /// bit doubles one of the three sides.
@@ -143,7 +123,7 @@ std::vector<int> all_costs(const ColourCells& cells, const std::vector<Vec3>& pl
         if (b > 0) out.push_back(between[b - 1]);
         for (std::size_t i = blocks[b] + 1; i < blocks[b + 1]; ++i)
             out.push_back(of_block[b] +
-                          width_cost(highest_difference_within(cells.keys[i - 1], cells.keys[i])));
+                          width_cost(highest_difference(cells.keys[i - 1], cells.keys[i])));
     }
     return out;
 }

@@ -10,12 +10,10 @@ namespace {
 constexpr double kSlack = 1e-10;  // constraints met within this count as met
 
 template <int N>
-using Point = std::array<double, N>;
-template <int N>
-using Solution = std::optional<Point<N>>;
+using Solution = std::optional<PointOf<N>>;
 
 template <int N>
-double margin(const HalfSpace<N>& h, const Point<N>& x) {
+double margin(const HalfSpace<N>& h, const PointOf<N>& x) {
     double value = -h.b;
     for (int i = 0; i < N; ++i) value += h.a[i] * x[i];
     return value;
@@ -23,21 +21,21 @@ double margin(const HalfSpace<N>& h, const Point<N>& x) {
 
 /// The optimum in the box, without constraints.
 template <int N>
-Point<N> corner(const Point<N>& c, const Point<N>& low, const Point<N>& high) {
-    Point<N> x;
+PointOf<N> corner(const PointOf<N>& c, const PointOf<N>& low, const PointOf<N>& high) {
+    PointOf<N> x;
     for (int i = 0; i < N; ++i) x[i] = c[i] >= 0 ? low[i] : high[i];
     return x;
 }
 
 template <int N>
-Solution<N> on_boundary(const Point<N>& c, const HalfSpace<N>& h,
+Solution<N> on_boundary(const PointOf<N>& c, const HalfSpace<N>& h,
                         const std::vector<HalfSpace<N>>& constraints, std::size_t count,
-                        const Point<N>& low, const Point<N>& high);
+                        const PointOf<N>& low, const PointOf<N>& high);
 
 template <int N>
-Solution<N> solve(const Point<N>& c, const std::vector<HalfSpace<N>>& constraints,
-                  const Point<N>& low, const Point<N>& high) {
-    Point<N> x = corner<N>(c, low, high);
+Solution<N> solve(const PointOf<N>& c, const std::vector<HalfSpace<N>>& constraints,
+                  const PointOf<N>& low, const PointOf<N>& high) {
+    PointOf<N> x = corner<N>(c, low, high);
     for (std::size_t m = 0; m < constraints.size(); ++m) {
         if (margin<N>(constraints[m], x) >= -kSlack) continue;
         const auto next = on_boundary<N>(c, constraints[m], constraints, m, low, high);
@@ -48,8 +46,8 @@ Solution<N> solve(const Point<N>& c, const std::vector<HalfSpace<N>>& constraint
 }
 
 template <>
-Solution<1> solve<1>(const Point<1>& c, const std::vector<HalfSpace<1>>& constraints,
-                     const Point<1>& low, const Point<1>& high) {
+Solution<1> solve<1>(const PointOf<1>& c, const std::vector<HalfSpace<1>>& constraints,
+                     const PointOf<1>& low, const PointOf<1>& high) {
     double lo = low[0], hi = high[0];
     for (const auto& h : constraints) {
         if (std::abs(h.a[0]) < 1e-13) {
@@ -61,21 +59,21 @@ Solution<1> solve<1>(const Point<1>& c, const std::vector<HalfSpace<1>>& constra
         }
     }
     if (lo > hi + kSlack) return std::nullopt;
-    return Point<1>{c[0] >= 0 ? lo : hi};
+    return PointOf<1>{c[0] >= 0 ? lo : hi};
 }
 
 /// The optimum on the boundary of h, under the first `count` constraints and the box. It is a
 /// program with one dimension less: eliminates the variable with the largest coefficient in h.
 template <int N>
-Solution<N> on_boundary(const Point<N>& c, const HalfSpace<N>& h,
+Solution<N> on_boundary(const PointOf<N>& c, const HalfSpace<N>& h,
                         const std::vector<HalfSpace<N>>& constraints, std::size_t count,
-                        const Point<N>& low, const Point<N>& high) {
+                        const PointOf<N>& low, const PointOf<N>& high) {
     // x_e = (b - sum a_i x_i) / a_e
     int e = 0;
     for (int i = 1; i < N; ++i)
         if (std::abs(h.a[i]) > std::abs(h.a[e])) e = i;
     if (std::abs(h.a[e]) < 1e-13) return std::nullopt;
-    auto project = [&](const Point<N>& a, double b) {
+    auto project = [&](const PointOf<N>& a, double b) {
         HalfSpace<N - 1> out;
         const double s = a[e] / h.a[e];
         for (int i = 0, j = 0; i < N; ++i)
@@ -87,13 +85,13 @@ Solution<N> on_boundary(const Point<N>& c, const HalfSpace<N>& h,
     rest.reserve(count + 2);
     for (std::size_t q = 0; q < count; ++q)
         rest.push_back(project(constraints[q].a, constraints[q].b));
-    Point<N> unit{};
+    PointOf<N> unit{};
     unit[e] = 1;
     rest.push_back(project(unit, low[e]));
     unit[e] = -1;
     rest.push_back(project(unit, -high[e]));
     const HalfSpace<N - 1> objective = project(c, 0);
-    Point<N - 1> sublow, subhigh;
+    PointOf<N - 1> sublow, subhigh;
     for (int i = 0, j = 0; i < N; ++i)
         if (i != e) {
             sublow[j] = low[i];
@@ -101,7 +99,7 @@ Solution<N> on_boundary(const Point<N>& c, const HalfSpace<N>& h,
         }
     const auto sub_x = solve<N - 1>(objective.a, rest, sublow, subhigh);
     if (!sub_x) return std::nullopt;
-    Point<N> x;
+    PointOf<N> x;
     double sum = h.b;
     for (int i = 0, j = 0; i < N; ++i)
         if (i != e) {
@@ -114,48 +112,33 @@ Solution<N> on_boundary(const Point<N>& c, const HalfSpace<N>& h,
 
 }  // namespace
 
-template <int N>
-std::optional<std::array<double, N>> minimise(const std::array<double, N>& c,
-                                              const std::vector<HalfSpace<N>>& constraints,
-                                              const std::array<double, N>& low,
-                                              const std::array<double, N>& high) {
-    return solve<N>(c, constraints, low, high);
+Solution<3> minimise(const PointOf<3>& c, const std::vector<HalfSpace<3>>& constraints,
+                     const PointOf<3>& low, const PointOf<3>& high) {
+    return solve<3>(c, constraints, low, high);
 }
 
-template <int N>
-std::optional<std::array<double, N>> minimise_by_need(const std::array<double, N>& c,
-                                                      const std::vector<HalfSpace<N>>& constraints,
-                                                      const std::array<double, N>& low,
-                                                      const std::array<double, N>& high) {
-    Point<N> x = corner<N>(c, low, high);
-    std::vector<HalfSpace<N>> taken;
+Solution<4> minimise_by_need(const PointOf<4>& c, const std::vector<HalfSpace<4>>& constraints,
+                             const PointOf<4>& low, const PointOf<4>& high) {
+    PointOf<4> x = corner<4>(c, low, high);
+    std::vector<HalfSpace<4>> taken;
     std::vector<bool> is_taken(constraints.size(), false);
     while (true) {
         double least = -kSlack;
         std::size_t worst = constraints.size();
         for (std::size_t m = 0; m < constraints.size(); ++m) {
             if (is_taken[m]) continue;
-            const double value = margin<N>(constraints[m], x);
+            const double value = margin<4>(constraints[m], x);
             if (value >= least) continue;
             least = value;
             worst = m;
         }
         if (worst == constraints.size()) return x;
-        const auto next = on_boundary<N>(c, constraints[worst], taken, taken.size(), low, high);
+        const auto next = on_boundary<4>(c, constraints[worst], taken, taken.size(), low, high);
         if (!next) return std::nullopt;
         x = *next;
         taken.push_back(constraints[worst]);
         is_taken[worst] = true;
     }
 }
-
-template std::optional<std::array<double, 3>> minimise<3>(const std::array<double, 3>&,
-                                                          const std::vector<HalfSpace<3>>&,
-                                                          const std::array<double, 3>&,
-                                                          const std::array<double, 3>&);
-template std::optional<std::array<double, 4>> minimise_by_need<4>(const std::array<double, 4>&,
-                                                                  const std::vector<HalfSpace<4>>&,
-                                                                  const std::array<double, 4>&,
-                                                                  const std::array<double, 4>&);
 
 }  // namespace palette4d

@@ -103,13 +103,8 @@ Grid blurred(Grid grid) {
 
 /// What one frame shows.
 struct Densities {
-    Grid object, background, band, part, held;
-    Densities()
-        : object(MatteGrid::kSize, 0.0f),
-          background(MatteGrid::kSize, 0.0f),
-          band(MatteGrid::kSize, 0.0f),
-          part(MatteGrid::kSize, 0.0f),
-          held(MatteGrid::kSize, 0.0f) {}
+    Grid object = Grid(MatteGrid::kSize);
+    Grid background = object, band = object, part = object, held = object;
 };
 
 void add_frame(Densities& all, const View& view, const Parts& parts, double weight) {

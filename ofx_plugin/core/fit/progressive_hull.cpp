@@ -117,8 +117,8 @@ private:
             for (double& x : n) x /= length;
             constraints.push_back({n, dot(n, p)});
         }
-        const auto x = minimise<3>(objective, constraints, {-kBound, -kBound, -kBound},
-                                   {1 + kBound, 1 + kBound, 1 + kBound});
+        const auto x = minimise(objective, constraints, {-kBound, -kBound, -kBound},
+                                {1 + kBound, 1 + kBound, 1 + kBound});
         if (!x) return;
         const double volume = std::max(0.0, dot(objective, *x) + constant);
         stamp_[{a, b}] = ++clock_;

@@ -203,7 +203,7 @@ private:
         Point low, high;
         low.fill(-kBound);
         high.fill(1 + kBound);
-        const auto x = minimise_by_need<4>(objective, constraints, low, high);
+        const auto x = minimise_by_need(objective, constraints, low, high);
         if (!x) return;
         waiting_.erase({a, b});
         stamp_[{a, b}] = ++clock_;
