@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <type_traits>
 #include <utility>
 
@@ -14,12 +13,6 @@ namespace {
 
 /// Exponents are clamped here, well within float, so that no edit overflows.
 constexpr double kLargestExponent = 120;
-
-std::string text_of(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.9g", value);
-    return text;
-}
 
 Vec3 product(const MatrixStep& step, const Vec3& x) {
     const auto& m = step.matrix;
@@ -147,8 +140,8 @@ public:
 private:
     [[noreturn]] void fail(const std::string& member, double found,
                            const std::string& expected) const {
-        throw SidecarError("", '/' + std::to_string(step_) + member, "the number " + text_of(found),
-                           expected);
+        throw SidecarError("", '/' + std::to_string(step_) + member,
+                           "the number " + decimal_text(found), expected);
     }
     void positive(double value, const std::string& member) const {
         if (!(value > 0)) fail(member, value, "a number above 0");
@@ -157,7 +150,7 @@ private:
         for (std::size_t i = 1; i < values.size(); ++i) {
             if (!(values[i] > values[i - 1])) {
                 fail(member + '/' + std::to_string(i), values[i],
-                     "numbers that rise, here above " + text_of(values[i - 1]));
+                     "numbers that rise, here above " + decimal_text(values[i - 1]));
             }
         }
     }

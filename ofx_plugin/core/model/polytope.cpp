@@ -2,25 +2,15 @@
 
 #include <algorithm>
 #include <iterator>
-#include <numeric>
 #include <utility>
 
 namespace palette4d {
 namespace {
 
-template <class Key>
-std::vector<int> sorted_indices(std::size_t count, Key key) {
-    std::vector<int> order(count);
-    std::iota(order.begin(), order.end(), 0);
-    std::sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b); });
-    return order;
-}
-
-template <class Wanted, class Key>
-int find_index(const std::vector<int>& order, const Wanted& wanted, Key key) {
-    const auto at = std::lower_bound(order.begin(), order.end(), wanted,
-                                     [&](int i, const Wanted& w) { return key(i) < w; });
-    return at != order.end() && key(*at) == wanted ? *at : -1;
+template <class Map>
+int found_in(const Map& map, const typename Map::key_type& wanted) {
+    const auto at = map.find(wanted);
+    return at == map.end() ? -1 : at->second;
 }
 
 }  // namespace
@@ -29,12 +19,14 @@ Polytope::Polytope(std::vector<Vertex> vertices, std::vector<Edge> edges,
                    std::vector<Section> sections) {
     validate_edges(vertices, edges);
     const auto parts = std::make_shared<Parts>();
-    parts->edges_by_ends = sorted_indices(
-        edges.size(), [&](int i) { return std::make_pair(edges[i].from, edges[i].to); });
-    parts->vertices_by_id = sorted_indices(
-        vertices.size(), [&](int i) -> const std::string& { return vertices[i].id; });
-    parts->edges_by_id =
-        sorted_indices(edges.size(), [&](int i) -> const std::string& { return edges[i].id; });
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+        parts->vertices_by_id.emplace(vertices[i].id, static_cast<int>(i));
+    }
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+        parts->edges_by_id.emplace(edges[i].id, static_cast<int>(i));
+        parts->edges_by_ends.emplace(std::make_pair(edges[i].from, edges[i].to),
+                                     static_cast<int>(i));
+    }
     parts->vertices = std::move(vertices);
     parts->edges = std::move(edges);
     parts->sections = std::move(sections);
@@ -43,19 +35,14 @@ Polytope::Polytope(std::vector<Vertex> vertices, std::vector<Edge> edges,
 }
 
 int Polytope::find_edge(int from, int to) const {
-    return find_index(parts_->edges_by_ends, std::make_pair(from, to),
-                      [this](int i) { return std::make_pair(edges()[i].from, edges()[i].to); });
+    return found_in(parts_->edges_by_ends, {from, to});
 }
 
 int Polytope::find_vertex(const std::string& id) const {
-    return find_index(parts_->vertices_by_id, id,
-                      [this](int i) -> const std::string& { return vertices()[i].id; });
+    return found_in(parts_->vertices_by_id, id);
 }
 
-int Polytope::find_edge(const std::string& id) const {
-    return find_index(parts_->edges_by_id, id,
-                      [this](int i) -> const std::string& { return edges()[i].id; });
-}
+int Polytope::find_edge(const std::string& id) const { return found_in(parts_->edges_by_id, id); }
 
 int Polytope::section_at(double frame) const {
     // The first section that ends at or after the frame; a transition's end belongs to the block.

@@ -3,8 +3,11 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <memory>
 #include <string>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "model/vec3.hpp"
@@ -74,8 +77,8 @@ private:
         std::vector<Vertex> vertices;
         std::vector<Edge> edges;
         std::vector<Section> sections;
-        // Indices in sorted order, for binary search.
-        std::vector<int> edges_by_ends, vertices_by_id, edges_by_id;
+        std::map<std::pair<int, int>, int> edges_by_ends;
+        std::unordered_map<std::string, int> vertices_by_id, edges_by_id;
     };
     std::shared_ptr<const Parts> parts_ = std::make_shared<const Parts>();
 };

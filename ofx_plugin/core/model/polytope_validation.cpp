@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cstdio>
 #include <set>
 #include <utility>
 
@@ -14,12 +13,7 @@ namespace {
     throw SidecarError("", pointer, found, expected);
 }
 
-std::string text(double number) {
-    char buffer[40];
-    std::snprintf(buffer, sizeof buffer, "%.15g", number);
-    return buffer;
-}
-
+std::string text(double number) { return decimal_text(number); }
 std::string text(std::size_t count) { return std::to_string(count); }
 
 /// Checks one section, and names its parts in error messages.

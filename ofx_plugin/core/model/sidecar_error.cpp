@@ -1,5 +1,6 @@
 #include "model/sidecar_error.hpp"
 
+#include <cstdio>
 #include <utility>
 
 namespace palette4d {
@@ -53,6 +54,12 @@ std::string printable(const std::string& text, std::size_t limit) {
         }
     }
     return shown;
+}
+
+std::string decimal_text(double number) {
+    char buffer[40];
+    std::snprintf(buffer, sizeof buffer, "%.15g", number);
+    return buffer;
 }
 
 std::string in_quotes(const std::string& text) { return '"' + printable(text, 60) + '"'; }

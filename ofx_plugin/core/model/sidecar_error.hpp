@@ -24,6 +24,8 @@ private:
 std::size_t utf8_length(const std::string& text, std::size_t at);
 /// Text for a message: valid UTF-8 on one line, at most `limit` bytes plus an ellipsis.
 std::string printable(const std::string& text, std::size_t limit);
+/// A number for a message, with 15 digits.
+std::string decimal_text(double number);
 /// A short text in quotes, made printable.
 std::string in_quotes(const std::string& text);
 

@@ -1,7 +1,6 @@
 #include "sidecar/cursor.hpp"
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 namespace palette4d {
 namespace {
@@ -50,8 +49,6 @@ void Cursor::limit(std::size_t count, std::size_t most, const std::string& of) c
     fail(std::to_string(count) + ' ' + of, "at most " + std::to_string(most) + ' ' + of);
 }
 
-bool Cursor::has(const char* name) const { return value_->contains(name); }
-
 Cursor Cursor::member(const char* name) const {
     const auto found = value_->find(name);
     if (found == value_->end()) {
@@ -75,20 +72,10 @@ Cursor Cursor::element(std::size_t index) const {
     return child;
 }
 
-std::size_t Cursor::size() const { return value_->size(); }
-
-std::string Cursor::text() const { return value_->get<std::string>(); }
-
-bool Cursor::is(const char* text) const { return *value_ == text; }
-
-double Cursor::number() const { return value_->get<double>(); }
-
 double Cursor::later(std::optional<double>& previous) const {
     if (previous && !(number() > *previous)) wrong("frames in increasing order, each once");
     return *(previous = number());
 }
-
-Vec3 Cursor::three() const { return value_->get<Vec3>(); }
 
 std::string Cursor::pointer() const {
     if (parent_ == nullptr) return "";

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
@@ -32,22 +33,22 @@ public:
     const Json& json() const { return *value_; }
     /// The name of this member; "elements" for an element of a list.
     std::string name() const { return name_ ? name_ : "elements"; }
-    bool has(const char* name) const;
+    bool has(const char* name) const { return value_->contains(name); }
     /// The required member `name`.
     Cursor member(const char* name) const;
     /// The same where its value is known.
     Cursor member(const char* name, const Json& value) const;
     Cursor element(std::size_t index) const;
-    std::size_t size() const;
+    std::size_t size() const { return value_->size(); }
 
-    std::string text() const;
+    std::string text() const { return value_->get<std::string>(); }
     /// Whether it is this text.
-    bool is(const char* text) const;
+    bool is(const char* text) const { return *value_ == text; }
     std::int64_t integer() const { return static_cast<std::int64_t>(number()); }
-    double number() const;
+    double number() const { return value_->get<double>(); }
     /// A number later than the `previous` one, which it becomes.
     double later(std::optional<double>& previous) const;
-    Vec3 three() const;
+    Vec3 three() const { return value_->get<Vec3>(); }
 
 private:
     std::string pointer() const;

@@ -1,7 +1,6 @@
 // The member "clip": frames, rate, size, colour spaces, and the conversion between them.
 #include <cstddef>
 #include <cstdint>
-#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "model/sidecar_error.hpp"
@@ -24,16 +23,14 @@ ConversionStep read_step(const Cursor& step) {
         return result;
     }
     if (kind.is("log")) {
-        LogStep result{};
-        result.base = step.member("base").number();
-        result.log_slope = three("log_slope");
-        result.log_offset = three("log_offset");
-        result.linear_slope = three("linear_slope");
-        result.linear_offset = three("linear_offset");
-        result.start = three("start");
-        result.below = three("below");
-        result.inverse = inverse();
-        return result;
+        return LogStep{step.member("base").number(),
+                       three("log_slope"),
+                       three("log_offset"),
+                       three("linear_slope"),
+                       three("linear_offset"),
+                       three("start"),
+                       three("below"),
+                       inverse()};
     }
     if (kind.is("gamma")) {
         return GammaStep{three("gamma"), three("offset"), step.member("negative").is("mirror"),

@@ -1,6 +1,5 @@
 // The member "polytope": vertices, edges, blocks and transitions.
 #include <cstddef>
-#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "model/sidecar_error.hpp"

@@ -3,7 +3,6 @@
 #include "sidecar/sidecar.hpp"
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
 #include "sidecar/codec.hpp"
 #include "sidecar/file_bytes.hpp"
