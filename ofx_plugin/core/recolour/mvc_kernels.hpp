@@ -86,8 +86,8 @@ struct Plan {
 };
 
 /// The kernels of one instruction set and one type. They read and write `count` colours, rounded up
-/// to whole registers; the padding must hold numbers, not NaN. `scratch` holds scratch_size(plan)
-/// values, aligned to 64 bytes. Each colour's result depends on that colour only.
+/// to whole registers; the padding must hold numbers, not NaN. `scratch` has scratch_size(plan)
+/// parts, aligned to 64 bytes. Each colour's result depends on that colour only.
 template <class T>
 struct Kernels {
     /// Mean value coordinates of colours inside a solid body. verdict: 1 when the displacement is
@@ -102,12 +102,12 @@ struct Kernels {
     void (*move)(Block<T>& block, int count, T strength, bool premultiplied);
 };
 
-/// Size of the scratch memory, enough for any instruction set.
+/// Size of the scratch memory in kStride<T> values, enough for any instruction set.
 template <class T>
-int scratch_size(const Plan<T>& plan) {
+std::size_t scratch_size(const Plan<T>& plan) {
     const int inside = 12 * plan.vertex_count + 3 * plan.edge_count + plan.face_count;
     const int closest = 2 * plan.segment_count + 3 * plan.triangle_count;
-    return kStride<T> * (inside > closest ? inside : closest);
+    return static_cast<std::size_t>(inside > closest ? inside : closest);
 }
 
 struct MvcKernels {

@@ -1,7 +1,6 @@
 // A palette and its edit in the form that mvc_kernels.hpp needs.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "recolour/frame_picks.hpp"
@@ -43,20 +42,10 @@ private:
 extern template class PlanMemory<float>;
 extern template class PlanMemory<double>;
 
-/// Scratch memory for kernels, aligned.
+/// What scratch memory for kernels is made of: numbers that one register holds at most.
 template <class T>
-class Scratch {
-public:
-    explicit Scratch(const Plan<T>& plan)
-        : memory_(static_cast<std::size_t>(scratch_size(plan)) + kNumbers) {}
-    T* data() {
-        const auto misfit = reinterpret_cast<std::uintptr_t>(memory_.data()) % 64 / sizeof(T);
-        return memory_.data() + (kNumbers - misfit) % kNumbers;
-    }
-
-private:
-    static constexpr std::size_t kNumbers = 64 / sizeof(T);
-    std::vector<T> memory_;
+struct alignas(64) ScratchPart {
+    T numbers[kStride<T>];
 };
 
 /// The plans of one palette and edit in one precision.

@@ -34,13 +34,39 @@ std::size_t slot(const Vec3& p) {
 class DoubleWorker final : public RowWorker {
 public:
     /// `recolourer` must outlive this and move some colour.
-    DoubleWorker(const Recolourer& recolourer, const RecolourOptions& options, int channels);
+    DoubleWorker(const Recolourer& recolourer, const RecolourOptions& options, int channels)
+        : recolourer_(recolourer),
+          strength_(options.strength),
+          divide_(options.premultiplied),
+          channels_(channels),
+          plan_(recolourer.plan().twofold.picks.plan()),
+          weights_(recolourer.original().size()) {}
 
-    void row(const float* from, float* to, int width, const Spot* spots) override;
+    void row(const float* from, float* to, int width, const Spot* spots) override {
+        for (int x = 0; x < width; ++x, from += channels_, to += channels_) {
+            if (channels_ == 4) to[3] = from[3];
+            if (recolourable(from, divide_)) {
+                recolour(from, to, spots ? spots + x : nullptr);
+            } else {
+                for (int c = 0; c < 3; ++c) to[c] = from[c];
+            }
+        }
+    }
     void finish() override {}
     RecolourCounts counts() const override { return {0, 0, count_}; }
+
     /// Recolours one pixel that is recolourable().
-    void recolour(const float* from, float* to, const Spot* spot);
+    void recolour(const float* from, float* to, const Spot* spot) {
+        ++count_;
+        const double alpha = divide_ ? from[3] : 1.0;
+        const Vec3 moved = displacement(straight_colour(from, divide_), spot);
+        for (std::size_t c = 0; c < 3; ++c) {
+            // Equals multiplying the displaced colour by alpha, with less rounding.
+            const double step = alpha * (strength_ * moved[c]);
+            // Channels that do not move keep their bits, even a negative zero.
+            to[c] = step != 0 ? static_cast<float>(from[c] + step) : from[c];
+        }
+    }
 
 private:
     struct Entry {
@@ -48,64 +74,28 @@ private:
         bool known;
     };
 
-    Vec3 displacement(const Vec3& p, const Spot* spot);
+    Vec3 displacement(const Vec3& p, const Spot* spot) {
+        if (memory_.empty()) memory_.assign(kSlots, Entry{{0, 0, 0}, {0, 0, 0}, false});
+        Entry& entry = memory_[slot(p)];
+        if (!entry.known || entry.colour != p) {
+            Vec3 moved = recolourer_.palette_displacement(p, weights_, workspace_);
+            if (!plan_.empty() && !spot) moved = with_picks(recolourer_.picks_, plan_, p, moved);
+            entry = {p, moved, true};
+        }
+        if (spot) return with_picks(recolourer_.picks_, plan_, p, entry.displacement, spot);
+        return entry.displacement;
+    }
 
     const Recolourer& recolourer_;
     const double strength_;
     const bool divide_;
     const int channels_;
-    const bool picks_;
     const PickPlan<double> plan_;
     std::vector<double> weights_;
     PaletteBody::Workspace workspace_;
     std::vector<Entry> memory_;
     long long count_ = 0;
 };
-
-DoubleWorker::DoubleWorker(const Recolourer& recolourer, const RecolourOptions& options,
-                           int channels)
-    : recolourer_(recolourer),
-      strength_(options.strength),
-      divide_(options.premultiplied),
-      channels_(channels),
-      picks_(!recolourer.plan().twofold.picks.plan().empty()),
-      plan_(recolourer.plan().twofold.picks.plan()),
-      weights_(recolourer.original().size()) {}
-
-void DoubleWorker::row(const float* from, float* to, int width, const Spot* spots) {
-    for (int x = 0; x < width; ++x, from += channels_, to += channels_) {
-        if (channels_ == 4) to[3] = from[3];
-        if (recolourable(from, divide_)) {
-            recolour(from, to, spots ? spots + x : nullptr);
-        } else {
-            for (int c = 0; c < 3; ++c) to[c] = from[c];
-        }
-    }
-}
-
-void DoubleWorker::recolour(const float* from, float* to, const Spot* spot) {
-    ++count_;
-    const double alpha = divide_ ? from[3] : 1.0;
-    const Vec3 moved = displacement(straight_colour(from, divide_), spot);
-    for (std::size_t c = 0; c < 3; ++c) {
-        // Equals multiplying the displaced colour by alpha, with less rounding.
-        const double step = alpha * (strength_ * moved[c]);
-        // Channels that do not move keep their bits, even a negative zero.
-        to[c] = step != 0 ? static_cast<float>(from[c] + step) : from[c];
-    }
-}
-
-Vec3 DoubleWorker::displacement(const Vec3& p, const Spot* spot) {
-    if (memory_.empty()) memory_.assign(kSlots, Entry{{0, 0, 0}, {0, 0, 0}, false});
-    Entry& entry = memory_[slot(p)];
-    if (!entry.known || entry.colour != p) {
-        Vec3 moved = recolourer_.palette_displacement(p, weights_, workspace_);
-        if (picks_ && !spot) moved = with_picks(recolourer_.picks_, plan_, p, moved);
-        entry = {p, moved, true};
-    }
-    if (spot) return with_picks(recolourer_.picks_, plan_, p, entry.displacement, spot);
-    return entry.displacement;
-}
 
 namespace {
 
@@ -171,7 +161,7 @@ private:
                   kSingleTolerance / 2 *
                   std::max(1 / std::abs(options.strength), static_cast<double>(plan_.spread)))),
               next_(next),
-              scratch_(plan_) {
+              scratch_(scratch_size(plan_) + 1) {  // never empty
             // Many colours lie exactly on the surface, where a channel is 0 or 1: they use the
             // closest point. The surface itself is rounded by about `step`. Where a step of that
             // length matters, the next stage decides.
@@ -254,7 +244,7 @@ private:
         /// Whether all colours are inside and their results guaranteed.
         bool displace(Block<T>& block, int count) {
             if (usable_) {
-                kernels_.inside(plan_, block, count, tolerance_, shell_, scratch_.data());
+                kernels_.inside(plan_, block, count, tolerance_, shell_, scratch_.data()->numbers);
                 // Colours inside the palette are not larger than it.
                 finish(block, count, plan_.mover_count > 0 && plan_.size <= kLargestPicked);
             } else {
@@ -325,7 +315,7 @@ private:
             if (outside_.count == 0) return;
             const int count = outside_.count;
             outside_.count = 0;
-            kernels_.closest(plan_, outside_.block, count, tolerance_, scratch_.data());
+            kernels_.closest(plan_, outside_.block, count, tolerance_, scratch_.data()->numbers);
             finish(outside_.block, count, false);
             for (int i = 0; i < count; ++i) {
                 settle(outside_, i, outside_.from[i], outside_.to[i]);
@@ -343,7 +333,7 @@ private:
         bool placed_ = false;  ///< the batches have places; the same for all pixels of a worker
         T shell_ = 0;
         Next& next_;
-        Scratch<T> scratch_;
+        std::vector<ScratchPart<T>> scratch_;
         Batch incoming_, outside_;
         long long count_ = 0;
     };
