@@ -8,7 +8,6 @@
 #include "arrays.hpp"
 #include "binders.hpp"
 #include "fit/colour_bins.hpp"
-#include "fit/colour_histogram.hpp"
 #include "fit/colour_links.hpp"
 #include "fit/colour_tree.hpp"
 #include "fit/palette_loss.hpp"
@@ -179,22 +178,6 @@ void bind_analysis(py::module_& m) {
             return py::make_tuple(k, to_array(gradient));
         },
         py::arg("vertices"), py::arg("edges"), py::arg("length"), py::arg("weights"));
-
-    m.def(
-        "colour_histogram",
-        [](const py::object& rgb, const py::object& counts, int cells, double to_one,
-           double above_one) {
-            const std::vector<Vec3> v = colours_from(rgb, "rgb");
-            const std::vector<double> n = numbers_from(counts, "counts");
-            std::vector<double> out;
-            {
-                py::gil_scoped_release release;
-                out = colour_histogram(v, n, {cells, to_one, above_one});
-            }
-            return to_array(out);
-        },
-        py::arg("rgb"), py::arg("counts"), py::kw_only(), py::arg("cells"), py::arg("to_one"),
-        py::arg("above_one"));
 
     m.def(
         "progressive_hull",

@@ -483,11 +483,6 @@ class LossWeights:
         slight: float = ...,
     ) -> None: ...
 
-def colour_histogram(
-    rgb: ArrayLike, counts: ArrayLike, *, cells: int, to_one: float, above_one: float
-) -> F64:
-    """`media.colour_histogram.histogram`, but pixels instead of their shares."""
-
 def palette_loss(
     colours: ColourTree,
     palette: ArrayLike,

@@ -8,10 +8,10 @@ scene-linear pictures; above 1 its cells are wider.
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
-
-from palette4d import _core
 
 F64 = NDArray[np.float64]
 
@@ -30,9 +30,17 @@ _CODE_VALUES = np.where(_EASED <= 1, _EASED**2, np.exp((_EASED - 1) / ABOVE_ONE)
 
 def histogram(rgb: F64, counts: F64) -> F64:
     """Return (CELLS^3,) shares of pixels of (n, 3) colours with (n,) counts; they sum to 1."""
-    out = _core.colour_histogram(rgb, counts, cells=CELLS, to_one=CELLS_TO_ONE, above_one=ABOVE_ONE)
-    shares_of_cells: F64 = out / out.sum()
-    return shares_of_cells
+    x = np.maximum(rgb, 0.0)
+    eased = np.where(x <= 1, np.sqrt(x), 1 + ABOVE_ONE * np.log(np.maximum(x, 1.0)))
+    place = np.clip(CELLS_TO_ONE * eased, 0, CELLS - 1)
+    lower = np.minimum(place.astype(int), CELLS - 2)
+    parts = np.stack([1 - (place - lower), place - lower])
+    out: F64 = np.zeros(CELLS**3)
+    for corner in itertools.product((0, 1), repeat=3):  # of the eight cells
+        r, g, b = (parts[upper, :, channel] for channel, upper in enumerate(corner))
+        cells = (lower + corner) @ (CELLS**2, CELLS, 1)
+        out += np.bincount(cells, counts * r * g * b, minlength=len(out))
+    return out / out.sum()
 
 
 def mean_shift(before: F64, after: F64) -> float:
