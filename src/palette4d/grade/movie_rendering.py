@@ -47,8 +47,7 @@ class MoviePlan:
         sound: bool,
     ) -> MoviePlan:
         """Plan a movie; OutputError if the codec does not fit."""
-        # Image files rarely state a rate, so the sidecar's rate is used.
-        rate = clip.rate if clip.is_movie else Fraction(*document.grade.core.clip["rate"])
+        rate = rate_of(clip, document)
         delivery = Delivery.plan(path, _stated(clip, rate), alpha=alpha, codec=codec, crf=crf)
         delivery.check_size(path, *size)
         copied, lost = None, []
@@ -69,6 +68,11 @@ class MoviePlan:
                 return self.path
 
             yield write
+
+
+def rate_of(clip: Clip, document: Document) -> Fraction:
+    """Return frames per second; image files rarely state them, so that the sidecar's count."""
+    return clip.rate if clip.is_movie else Fraction(*document.grade.core.clip["rate"])
 
 
 def movie_notes(clip: Clip, delivery: Delivery, size: tuple[int, int]) -> list[str]:

@@ -7,7 +7,6 @@ import os
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
-from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,7 +15,7 @@ import numpy as np
 from palette4d.common.files import make_folder
 from palette4d.common.message import Arg
 from palette4d.grade.document import Document
-from palette4d.grade.movie_rendering import MoviePlan
+from palette4d.grade.movie_rendering import MoviePlan, rate_of
 from palette4d.grade.output import Output
 from palette4d.media import existing
 from palette4d.media.array_clip import ArrayClip
@@ -146,7 +145,8 @@ class Painter:
         self.filled.append(frame)
         if self.missing == "black":
             pixels = np.zeros_like(pixels)
-        metadata = of_another_frame(image.metadata, frame - image.frame, self._rate)
+        rate = rate_of(self.clip, self.document)
+        metadata = of_another_frame(image.metadata, frame - image.frame, rate)
         return replace(image, frame=frame, metadata=metadata), pixels
 
     def _painted(self, frame: int) -> tuple[Image, F32] | None:
@@ -190,13 +190,6 @@ class Painter:
             space=self.space,
             threads=self.threads,
         )
-
-    @property
-    def _rate(self) -> Fraction:
-        """Frames per second; image files rarely state them, so that the sidecar's count."""
-        if self.clip.is_movie:
-            return self.clip.rate
-        return Fraction(*self.document.grade.core.clip["rate"])
 
     @property
     def large(self) -> bool:

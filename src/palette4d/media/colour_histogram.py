@@ -40,7 +40,8 @@ def histogram(rgb: F64, counts: F64) -> F64:
         r, g, b = (parts[upper, :, channel] for channel, upper in enumerate(corner))
         cells = (lower + corner) @ (CELLS**2, CELLS, 1)
         out += np.bincount(cells, counts * r * g * b, minlength=len(out))
-    return out / out.sum()
+    shares: F64 = out / out.sum()
+    return shares
 
 
 def mean_shift(before: F64, after: F64) -> float:
