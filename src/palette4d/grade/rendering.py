@@ -288,8 +288,7 @@ def render(
         clip = like_source(os.fspath(clip), str(document.grade.core.clip["source"]))
     movie = is_movie(Path(output))
     clip, fill = opened_for_render(clip, frames, missing, skip_bad_frames, movie=movie)
-    width = clip.width * (2 if compare == "side" else 1)
-    inputs = {clip.file(frame) for frame in clip.frames}
+    size = clip.width * (2 if compare == "side" else 1), clip.height
     todo = clip.frames
     opened: contextlib.AbstractContextManager[_Write]
     if movie:
@@ -309,13 +308,13 @@ def render(
             clip,
             document,
             Path(output),
-            (width, clip.height),
+            size,
             alpha=clip.has_alpha or drawn.in_alpha,
             codec=codec,
             crf=crf,
             sound=sound,
         )
-        check_targets([Path(output)], inputs, force or skip_existing)
+        check_targets([Path(output)], set(map(clip.file, clip.frames)), force or skip_existing)
         make_folder(Path(output).parent)
         notes, opened = [*repeated, *plan.notes], plan.opened()
     else:
@@ -323,13 +322,7 @@ def render(
         pattern = FramePattern.parse(output, ", or a movie OUT.mp4 or OUT.mov")
         samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)
         todo, repeated = frames_to_render(
-            clip,
-            pattern,
-            inputs,
-            (width, clip.height),
-            document.path,
-            skip_existing=skip_existing,
-            force=force,
+            clip, pattern, size, document.path, skip_existing=skip_existing, force=force
         )
         make_folder(pattern.folder)
         clip, left_out = with_surroundings(clip, pattern, drawn, compare)
@@ -429,7 +422,6 @@ def opened_for_render(
 def frames_to_render(
     clip: Clip,
     pattern: FramePattern,
-    inputs: set[Path],
     size: tuple[int, int],
     sidecar: Path | None,
     *,
@@ -441,14 +433,12 @@ def frames_to_render(
     `size` is that of the pictures.
     """
     targets = dict(zip(clip.frames, pattern.paths(clip.frames), strict=True))
-    damaged: set[int] = set()
-    older: set[int] = set()
-    if skip_existing:
-        there = {frame: path for frame, path in targets.items() if path.is_file()}
-        damaged = {f for f, path in there.items() if not existing.is_whole_frame(path, size)}
-        older = {f for f, path in there.items() if existing.is_older(path, sidecar)} - damaged
-        done = set(there) - damaged - older
-        targets = {frame: path for frame, path in targets.items() if frame not in done}
+    there = {frame: path for frame, path in targets.items() if skip_existing and path.is_file()}
+    damaged = {f for f, path in there.items() if not existing.is_whole_frame(path, size)}
+    older = {f for f, path in there.items() if existing.is_older(path, sidecar)} - damaged
+    for done in there.keys() - damaged - older:
+        del targets[done]
+    inputs = set(map(clip.file, clip.frames))
     check_targets(list(targets.values()), inputs, force or skip_existing)
     return list(targets), existing.again(len(damaged), len(older))
 

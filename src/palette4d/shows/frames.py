@@ -134,10 +134,9 @@ def _on_farm(
     clip, fill = rendering.opened_for_render(spec, frames, missing, skip_bad_frames, movie=False)
     pattern = FramePattern.parse(str(output))
     samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)
-    inputs = {clip.file(frame) for frame in clip.frames}
     size = clip.width * (2 if compare == "side" else 1), clip.height
     todo, repeated = rendering.frames_to_render(
-        clip, pattern, inputs, size, document.path, skip_existing=skip_existing, force=force
+        clip, pattern, size, document.path, skip_existing=skip_existing, force=force
     )
     make_folder(pattern.folder)
     warnings = rendering.mismatches(document, clip, frames is None)
