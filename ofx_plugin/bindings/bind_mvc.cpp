@@ -13,23 +13,6 @@ DoubleArray table(std::size_t rows, std::size_t columns) {
     return DoubleArray({static_cast<py::ssize_t>(rows), static_cast<py::ssize_t>(columns)});
 }
 
-DoubleArray mean_value_table(const py::object& points, const py::object& rgb,
-                             const py::object& faces) {
-    const std::vector<Vec3> p = colours_from(points, "points");
-    const PaletteBody body(colours_from(rgb, "rgb"), faces_from(faces));
-    const std::size_t n = body.rgb().size();
-    if (body.faces().empty()) {
-        throw py::value_error("mean_value_coordinates: a palette of " + std::to_string(n) +
-                              " colours has no faces, expected at least 3 colours");
-    }
-    DoubleArray weights = table(p.size(), n);
-    double* out = weights.mutable_data();
-    const py::gil_scoped_release unlocked;
-    PaletteBody::Workspace workspace;
-    for (std::size_t i = 0; i < p.size(); ++i) body.mean_value(p[i], out + i * n, workspace);
-    return weights;
-}
-
 py::tuple palette_weight_table(const py::object& points, const py::object& rgb,
                                const py::object& faces) {
     const std::vector<Vec3> p = colours_from(points, "points");
@@ -76,9 +59,6 @@ DoubleArray polytope_weight_table(const py::object& points, const Polytope& poly
 }  // namespace
 
 void bind_mvc(py::module_& module) {
-    module.def("mean_value_coordinates", &mean_value_table, py::arg("points"), py::arg("rgb"),
-               py::arg("faces"),
-               "(m, 3), (n, 3), (f, 3) -> (m, n) weights. Points that are not finite give NaN.");
     module.def("palette_weights", &palette_weight_table, py::arg("points"), py::arg("rgb"),
                py::arg("faces"),
                "(m, 3), (n, 3), (f, 3) -> (m, n) weights of q(p) and (m,) distances |p - q|, 0 "

@@ -244,8 +244,6 @@ py::tuple encode(const py::object& members, const py::str& called) {
 }  // namespace
 
 void bind_sidecar(py::module_& module) {
-    module.attr("SIDECAR_VERSION") = palette4d::kSidecarVersion;
-
     py::class_<Edits>(module, "_Edits");
     py::class_<NamedEdits, Edits>(module, "Edits",
                                   "Edited colours of vertices, colour stops on edges, and picks.")

@@ -15,7 +15,6 @@ I32 = NDArray[np.int32]
 U8 = NDArray[np.uint8]
 
 __version__: str
-SIDECAR_VERSION: int
 
 class Polytope:
     """The 4D skew polytope (section 4.1). Build one with `parse_sidecar` or `read_sidecar`."""
@@ -178,9 +177,6 @@ def plain(value: Any, name: str = ...) -> Any:
 def slice_at(polytope: Polytope, frame: float) -> Slice: ...
 def edited_colours(polytope: Polytope, edits: Edits, slice: Slice) -> F64:
     """(n, 3) float64 edited colours of the slice's vertices."""
-
-def mean_value_coordinates(points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> F64:
-    """(m, 3), (n, 3), (f, 3) -> (m, n) weights. Points that are not finite give NaN."""
 
 def palette_weights(points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> tuple[F64, F64]:
     """(m, 3), (n, 3), (f, 3) -> (m, n) weights of q(p) and (m,) distances |p - q|, 0 inside.

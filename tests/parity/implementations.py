@@ -33,9 +33,6 @@ class Reference:
     def edited(self, document: Document, frame: float) -> F64:
         return reference.edited_colours(document, frame)
 
-    def mvc(self, points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> F64:
-        return reference.mean_value_coordinates(points, rgb, faces)
-
     def weights(self, points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> tuple[F64, F64]:
         return reference.palette_weights(points, rgb, faces)
 
@@ -89,9 +86,6 @@ class Core:
         edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
         picks = sidecar.picks_at(cut.frame)
         return _core.Recolourer(cut.rgb, edited, cut.faces, picks=picks)
-
-    def mvc(self, points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> F64:
-        return _core.mean_value_coordinates(points, rgb, faces)
 
     def weights(self, points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> tuple[F64, F64]:
         return _core.palette_weights(points, rgb, faces)

@@ -564,16 +564,6 @@ def solid_angle_turns(p: F64, rgb: F64, faces: list[list[int]]) -> float:
     return total / (4 * np.pi)
 
 
-def mean_value_coordinates(points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> F64:
-    """(m, 3), (n, 3), (f, 3) -> (m, n) weights."""
-    colours, triangles = np.asarray(rgb, float), np.asarray(faces, int).reshape(-1, 3).tolist()
-    rows = []
-    for p in np.asarray(points, float):
-        weights = mean_value_weights(p, colours, triangles)
-        rows.append(closest_weights(p, colours, triangles)[1] if weights is None else weights)
-    return np.array(rows).reshape(-1, len(colours))
-
-
 def palette_weights(points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> tuple[F64, F64]:
     """(m, 3), (n, 3), (f, 3) -> (m, n) weights of q(p) and (m,) distances |p - q|."""
     colours = tuple(map(tuple, np.asarray(rgb, float).tolist()))

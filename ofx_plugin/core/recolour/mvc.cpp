@@ -226,7 +226,7 @@ void PaletteBody::prepare_edges(Workspace& w) const {
 // beside it. Seen from the foot, the angles with the signs of the a_j sum to exactly 2 pi or 0.
 // Only the differences from that sum, all of order h^2, are added. So no precision is lost, even
 // when h is as small as the rounding.
-bool PaletteBody::mean_value_or_fail(const Vec3& p, double* weights, Workspace& w) const {
+bool PaletteBody::mean_value(const Vec3& p, double* weights, Workspace& w) const {
     const std::size_t n = rgb_.size();
     set_to(0, n, weights);
     w.to_vertex_.resize(n);
@@ -317,20 +317,6 @@ bool PaletteBody::mean_value_or_fail(const Vec3& p, double* weights, Workspace& 
     return true;
 }
 
-void PaletteBody::mean_value(const Vec3& p, double* weights, Workspace& workspace) const {
-    if (faces_.empty()) {
-        throw std::invalid_argument("mean value coordinates need a palette with faces");
-    }
-    if (!finite(p)) {
-        set_to(std::numeric_limits<double>::quiet_NaN(), rgb_.size(), weights);
-        return;
-    }
-    const Vec3 near = within_reach(p);
-    if (flat_ || !mean_value_or_fail(near, weights, workspace)) {
-        spread(closest_point(near, false), weights);
-    }
-}
-
 Projection PaletteBody::project(const Vec3& p, double* weights, Workspace& workspace) const {
     const std::size_t n = rgb_.size();
     if (!finite(p)) {
@@ -347,12 +333,12 @@ Projection PaletteBody::project(const Vec3& p, double* weights, Workspace& works
         for (std::size_t f = 0; inside && f < faces_.size(); ++f) {
             inside = dot(planes_[f].normal, rgb_[faces_[f][0]] - near) >= 0;
         }
-        if (inside && mean_value_or_fail(near, weights, workspace)) return {p, 0, true};
+        if (inside && mean_value(near, weights, workspace)) return {p, 0, true};
         closest = closest_point(near, true);
     } else {
         closest = closest_point(near, false);
         if (!flat_ && closest.distance > tolerance_ && std::abs(winding_number(near)) > 0.5 &&
-            mean_value_or_fail(near, weights, workspace)) {
+            mean_value(near, weights, workspace)) {
             return {p, 0, true};
         }
     }

@@ -47,11 +47,6 @@ public:
     const std::vector<std::size_t>& skin() const { return skin_; }
     std::size_t bytes() const { return vector_bytes(rgb_, faces_, planes_, edges_, skin_); }
 
-    /// Mean value coordinates of p: n weights that sum to 1 and reproduce p. On a vertex, edge or
-    /// face they are its barycentric weights. A triangle whose plane contains p, with p outside the
-    /// triangle, adds nothing. Where the total weight vanishes (far outside, or collapsed meshes),
-    /// the weights are those of the closest surface point. NaN weights when p is not finite.
-    void mean_value(const Vec3& p, double* weights, Workspace& workspace) const;
     /// Weights of q(p): mean value coordinates inside, barycentric weights of the closest surface
     /// point outside. They are continuous across the surface. One colour has weight 1; for two
     /// colours q is the closest point of their segment. A flat palette is all surface. NaN weights
@@ -82,7 +77,10 @@ private:
     Closest closest_on_segment(const Vec3& p, int a, int b) const;
     Closest closest_point(const Vec3& p, bool visible_only) const;
     Vec3 within_reach(const Vec3& p) const;
-    bool mean_value_or_fail(const Vec3& p, double* weights, Workspace& workspace) const;
+    /// Mean value coordinates of p: n weights that sum to 1 and reproduce p. On a vertex, edge or
+    /// face they are its barycentric weights. A triangle whose plane contains p, with p outside the
+    /// triangle, adds nothing. False where the total weight vanishes (collapsed meshes).
+    bool mean_value(const Vec3& p, double* weights, Workspace& workspace) const;
     void prepare_edges(Workspace& workspace) const;
     double winding_number(const Vec3& p) const;
     void spread(const Closest& closest, double* weights) const;

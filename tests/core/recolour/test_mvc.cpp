@@ -13,13 +13,6 @@ namespace {
 
 using Weights = std::vector<double>;
 
-Weights mvc(const Mesh& mesh, const Vec3& p) {
-    Weights w(mesh.rgb.size());
-    PaletteBody::Workspace workspace;
-    PaletteBody(mesh.rgb, mesh.faces).mean_value(p, w.data(), workspace);
-    return w;
-}
-
 struct Projected {
     Projection at;
     Weights w;
@@ -32,6 +25,8 @@ Projected project(const Mesh& mesh, const Vec3& p) {
     result.at = PaletteBody(mesh.rgb, mesh.faces).project(p, result.w.data(), workspace);
     return result;
 }
+
+Weights weights(const Mesh& mesh, const Vec3& p) { return project(mesh, p).w; }
 
 double sum(const Weights& w) {
     double total = 0;
@@ -86,7 +81,7 @@ TEST(weights_sum_to_one_and_reproduce_the_point) {
         const Mesh mesh = random_convex(random, 4 + random.below(20));
         for (int i = 0; i < 20; ++i) {
             const Vec3 p = inner_point(mesh, random);
-            const Weights w = mvc(mesh, p);
+            const Weights w = weights(mesh, p);
             CHECK_NEAR(sum(w), 1, 1e-13);
             CHECK(apart(combined(mesh, w), p) < 1e-12);
             for (const double x : w) CHECK(x >= -1e-13);
@@ -117,7 +112,7 @@ TEST(on_a_vertex_the_weight_is_its_own) {
     for (int round = 0; round < 100; ++round) {
         const Mesh mesh = random_convex(random, 4 + random.below(12));
         for (std::size_t i = 0; i < mesh.rgb.size(); ++i) {
-            const Weights w = mvc(mesh, mesh.rgb[i]);
+            const Weights w = weights(mesh, mesh.rgb[i]);
             for (std::size_t j = 0; j < w.size(); ++j) CHECK_EQUAL(w[j], i == j ? 1.0 : 0.0);
             const Projected at = project(mesh, mesh.rgb[i]);
             CHECK_NEAR(at.w[i], 1, 1e-12);
@@ -144,11 +139,10 @@ TEST(on_and_near_edges_and_faces_weights_are_barycentric) {
             on_face[face[2]] = w / (u + v + w);
             for (const Weights& expected : {on_edge, on_face}) {
                 const Vec3 p = combined(mesh, expected);
-                CHECK(apart(mvc(mesh, p), expected) < 1e-10);
-                CHECK(apart(project(mesh, p).w, expected) < 1e-10);
+                CHECK(apart(weights(mesh, p), expected) < 1e-10);
                 // Inwards, the weights move away in proportion, without a jump.
                 for (const double step : {1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6}) {
-                    const Weights near = mvc(mesh, mix(p, centre, step));
+                    const Weights near = weights(mesh, mix(p, centre, step));
                     CHECK(apart(near, expected) < 1e-10 + 1e3 * step);
                     CHECK(apart(combined(mesh, near), mix(p, centre, step)) < 1e-11);
                 }
@@ -163,7 +157,8 @@ TEST(close_to_a_face_nothing_is_lost) {
     const Mesh mesh = tetrahedron();
     const Weights expected{1 - 0.3 - 0.25, 0.3, 0.25, 0};
     for (const double h : {1e-6, 1e-7, 1e-8}) {
-        const Weights once = mvc(mesh, {0.3, 0.25, h}), twice = mvc(mesh, {0.3, 0.25, 2 * h});
+        const Weights once = weights(mesh, {0.3, 0.25, h}),
+                      twice = weights(mesh, {0.3, 0.25, 2 * h});
         // In a tetrahedron mean value coordinates are barycentric coordinates.
         CHECK(apart(once, {1 - 0.55 - h, 0.3, 0.25, h}) < 1e-14);
         CHECK(apart(twice, {1 - 0.55 - 2 * h, 0.3, 0.25, 2 * h}) < 1e-14);
@@ -180,13 +175,13 @@ TEST(a_face_whose_plane_holds_the_point_adds_nothing_beside_it) {
         // The plane through (0,0,1), (1,0,1), (.5,.5,.3): z = 1 - 1.4 y.
         const double y = random.uniform(0.51, 0.7);
         const Vec3 p{random.uniform(0.05, 0.95), y, 1 - 1.4 * y};
-        const Weights w = mvc(mesh, p);
+        const Weights w = weights(mesh, p);
         CHECK_NEAR(sum(w), 1, 1e-12);
         CHECK(apart(combined(mesh, w), p) < 1e-11);
         for (const double h : {1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-5, 1e-4, 1e-3}) {
             for (const double side : {-1.0, 1.0}) {
                 const Vec3 q{p[0], p[1] + side * h * 0.81, p[2] + side * h * 0.58};
-                const Weights near = mvc(mesh, q);
+                const Weights near = weights(mesh, q);
                 CHECK(apart(near, w) < 100 * h + 1e-11);
                 CHECK(apart(combined(mesh, near), q) < 1e-11);
             }
@@ -201,7 +196,8 @@ TEST(the_two_ways_near_a_plane_and_away_from_it_meet) {
     const Mesh mesh = cube();
     for (double x = 0.1; x < 0.95; x += 0.1) {
         for (double z = 1e-3; z < 0.1; z *= 1.01) {
-            const Weights a = mvc(mesh, {x, 0.37, z}), b = mvc(mesh, {x, 0.37, z * (1 + 1e-12)});
+            const Weights a = weights(mesh, {x, 0.37, z}),
+                          b = weights(mesh, {x, 0.37, z * (1 + 1e-12)});
             CHECK(apart(a, b) < 1e-12);
         }
     }
@@ -233,11 +229,6 @@ TEST(any_finite_point_gives_finite_weights_that_sum_to_one) {
             points.push_back(random.colour(-1, 2));
         }
         for (const Vec3& p : points) {
-            const Weights w = mvc(mesh, p);
-            // Far away the weights are large and of both signs.
-            double size = 0;
-            for (const double x : w) size += std::abs(x);
-            CHECK_NEAR(sum(w), 1, 1e-14 * size);
             const Projected at = project(mesh, p);
             CHECK_NEAR(sum(at.w), 1, 1e-9);
             CHECK(std::isfinite(at.at.q[0]) && at.at.distance >= 0);
@@ -315,8 +306,7 @@ TEST(a_flat_palette_is_all_surface) {
             const Vec3 p{x, 0.83 * x + 0.05, 0.5}, q{x, 0.97 - 0.83 * x, 0.7};
             for (const Vec3& here : {p, q}) {
                 const Vec3 there{here[0] + 0.001, here[1], here[2]};
-                CHECK(apart(project(mesh, here).w, project(mesh, there).w) < 0.003);
-                CHECK(apart(mvc(mesh, here), mvc(mesh, there)) < 0.003);
+                CHECK(apart(weights(mesh, here), weights(mesh, there)) < 0.003);
             }
         }
     }
@@ -340,6 +330,6 @@ TEST(what_is_not_finite_stays_unknown) {
         const Projected at = project(cube(), p);
         for (const double x : at.w) CHECK(std::isnan(x));
         CHECK(std::isnan(at.at.distance));
-        for (const double x : mvc(cube(), p)) CHECK(std::isnan(x));
+        for (const double x : weights(cube(), p)) CHECK(std::isnan(x));
     }
 }
