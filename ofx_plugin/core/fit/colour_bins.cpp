@@ -386,16 +386,14 @@ Vec3 ColourBinner::colour_of(std::uint32_t code) const {
     return {r, g, b};
 }
 
-/// Calls use(code, value) for all nonzero entries of the table in order, and zeroes them. Calls
-/// begin(first code) before each block that has some.
-template <class Begin, class Use>
-void ColourBinner::drain(Begin begin_block, Use use) {
+/// Calls use(code, value) for all nonzero entries of the table in order, and zeroes them.
+template <class Use>
+void ColourBinner::drain(Use use) {
     constexpr std::size_t kGroup = 4;  // most entries are 0: tested four at a time
     for (std::size_t block = 0; block < touched_.size(); ++block) {
         if (!touched_[block]) continue;
         touched_[block] = 0;
         const auto first = static_cast<std::uint32_t>(block * kBlock);
-        begin_block(first);
         for (std::uint32_t code = first; code < first + kBlock; code += kGroup) {
             std::uint32_t* const four = &table_[code];
             if (!(four[0] | four[1] | four[2] | four[3])) continue;
@@ -409,11 +407,14 @@ void ColourBinner::drain(Begin begin_block, Use use) {
 /// Samples 8-bit codes: the table holds their counts.
 ColourBins ColourBinner::sampled_codes(std::size_t most) {
     std::vector<Vec3> places;
-    drain([&](std::uint32_t first) { places.push_back(colour_of(first | kMiddle)); },
-          [&](std::uint32_t code, std::uint32_t count) {
-              drained_.keys.push_back(code);
-              drained_.counts.push_back(count);
-          });
+    drain([&](std::uint32_t code, std::uint32_t count) {
+        const std::uint32_t first = code & ~static_cast<std::uint32_t>(kBlock - 1);
+        if (drained_.keys.empty() || drained_.keys.back() < first) {
+            places.push_back(colour_of(first | kMiddle));
+        }
+        drained_.keys.push_back(code);
+        drained_.counts.push_back(count);
+    });
     return sampled(drained_, places, most, [&](std::size_t i) {
         return colour_of(static_cast<std::uint32_t>(drained_.keys[i]));
     });
@@ -431,7 +432,7 @@ ColourBins ColourBinner::sampled_means(std::size_t most) {
     std::sort(outside.begin(), outside.end());
     auto next = outside.begin();
     for (; next != outside.end() && next->first << shift_ < kUnitCube; ++next) append(next->second);
-    drain([](std::uint32_t) {}, [&](std::uint32_t, std::uint32_t index) { append(index); });
+    drain([&](std::uint32_t, std::uint32_t index) { append(index); });
     for (; next != outside.end(); ++next) append(next->second);
 
     std::vector<Vec3> places;

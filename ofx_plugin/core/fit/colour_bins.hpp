@@ -89,8 +89,8 @@ private:
     Vec3 colour_of(std::uint32_t code) const;
     ColourBins sampled_codes(std::size_t most);
     ColourBins sampled_means(std::size_t most);
-    template <class Begin, class Use>
-    void drain(Begin begin_block, Use use);
+    template <class Use>
+    void drain(Use use);
 
     Kind kind_ = Kind::none;
     LumaChroma how_{};

@@ -192,13 +192,12 @@ Mask held_side(const View& view, const Mask& object, const Mask& held) {
         length[i] = 0;
         open.push({0.0f, i});
     }
-    const auto width = static_cast<std::size_t>(view.width);
     while (!open.empty()) {
         const auto [own, i] = open.top();
         open.pop();
         if (done[i]) continue;
         done[i] = 1;
-        const auto visit = [&, from = i, so_far = own](std::size_t to) {
+        visit_around(view, i, [&, from = i, so_far = own](std::size_t to) {
             float step = kShortest;
             for (const Image& plane : view.ways) {
                 const float change = plane[to] - plane[from];
@@ -208,11 +207,7 @@ Mask held_side(const View& view, const Mask& object, const Mask& held) {
             length[to] = so_far + step;
             side[to] = side[from];
             open.push({length[to], to});
-        };
-        if (i % width > 0) visit(i - 1);
-        if (i % width + 1 < width) visit(i + 1);
-        if (i >= width) visit(i - width);
-        if (i + width < view.size()) visit(i + width);
+        });
     }
     return side;
 }

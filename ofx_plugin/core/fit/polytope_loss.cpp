@@ -1,7 +1,6 @@
 #include "fit/polytope_loss.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>

@@ -11,20 +11,25 @@
 
 namespace palette4d {
 
+/// Calls visit(pixel) for the neighbours of a pixel, four or fewer.
+template <class Visit>
+void visit_around(const View& view, std::size_t i, Visit visit) {
+    const auto width = static_cast<std::size_t>(view.width);
+    if (i % width > 0) visit(i - 1);
+    if (i % width + 1 < width) visit(i + 1);
+    if (i >= width) visit(i - width);
+    if (i + width < view.size()) visit(i + width);
+}
+
 /// Spreads from the pixels in `open` to neighbours that join(pixel) takes.
 template <class Join>
 void spread(const View& view, std::vector<std::size_t> open, Join join) {
-    const auto width = static_cast<std::size_t>(view.width);
-    const auto visit = [&](std::size_t i) {
-        if (join(i)) open.push_back(i);
-    };
     while (!open.empty()) {
         const std::size_t i = open.back();
         open.pop_back();
-        if (i % width > 0) visit(i - 1);
-        if (i % width + 1 < width) visit(i + 1);
-        if (i >= width) visit(i - width);
-        if (i + width < view.size()) visit(i + width);
+        visit_around(view, i, [&](std::size_t next) {
+            if (join(next)) open.push_back(next);
+        });
     }
 }
 

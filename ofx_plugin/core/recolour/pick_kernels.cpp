@@ -2,9 +2,6 @@
 // are those of with_picks().
 #include "recolour/pick_kernels.hpp"
 
-#include <cstddef>
-#include <cstring>
-
 // Constants only: no function of another header may be compiled for this instruction set.
 #include "model/matte.hpp"
 #include "simd/lanes.hpp"

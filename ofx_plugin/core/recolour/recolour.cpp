@@ -1,7 +1,5 @@
 #include "recolour/recolour.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>

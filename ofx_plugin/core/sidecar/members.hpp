@@ -29,9 +29,9 @@ Polytope read_polytope(const Cursor& where, const ClipInfo& clip);
 PickMattes read_mattes(const Cursor& mattes, const PickMattes& known);
 std::vector<Pick> read_picks(const Cursor& where, const PickMattes& mattes);
 
-Edits read_edits(const Cursor& where, const Polytope& polytope, const PickMattes& mattes);
-std::vector<NamedVersion> read_versions(const Cursor& where, const Polytope& polytope,
-                                        const PickMattes& mattes);
+/// Edits of a sidecar whose clip, polytope and mattes are known.
+Edits read_edits(const Cursor& where, const Sidecar& of);
+std::vector<NamedVersion> read_versions(const Cursor& where, const Sidecar& of);
 /// Checks the clip's weighted colours, which only Python reads.
 void check_colours(const Cursor& colours);
 

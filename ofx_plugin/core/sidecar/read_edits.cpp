@@ -54,11 +54,12 @@ void check_colours(const Cursor& colours) {
     }
 }
 
-Edits read_edits(const Cursor& where, const Polytope& polytope, const PickMattes& mattes) {
+Edits read_edits(const Cursor& where, const Sidecar& of) {
+    const Polytope& polytope = of.polytope;
     Edits edits;
-    edits.frame_step = mattes.frame_step;
-    edits.width = mattes.width;
-    edits.height = mattes.height;
+    edits.frame_step = static_cast<double>(of.clip.step);
+    edits.width = static_cast<double>(of.clip.width);
+    edits.height = static_cast<double>(of.clip.height);
     edits.vertex_rgb.resize(polytope.vertices().size());
     edits.vertex_ramp.resize(edits.vertex_rgb.size());
     edits.default_ramp = read_ramp(where).value_or(Ramp::kLinear);
@@ -88,16 +89,15 @@ Edits read_edits(const Cursor& where, const Polytope& polytope, const PickMattes
         edits.stops.push_back(std::move(stop));
     }
     edits.stop_order = order_of(edits.stops);
-    edits.display = mattes.display;
-    if (where.has("picks")) edits.picks = read_picks(where.member("picks"), mattes);
+    edits.display = of.mattes.display;
+    if (where.has("picks")) edits.picks = read_picks(where.member("picks"), of.mattes);
     return edits;
 }
 
-std::vector<NamedVersion> read_versions(const Cursor& where, const Polytope& polytope,
-                                        const PickMattes& mattes) {
+std::vector<NamedVersion> read_versions(const Cursor& where, const Sidecar& of) {
     std::vector<NamedVersion> versions;
     std::set<std::string> taken;
-    const std::size_t n = where.size(), vertices = polytope.vertices().size();
+    const std::size_t n = where.size(), vertices = of.polytope.vertices().size();
     if (n * vertices > kMaxVersionVertices) {
         where.fail(std::to_string(n) + " versions of " + std::to_string(vertices) + " vertices",
                    "versions times vertices of at most " + std::to_string(kMaxVersionVertices));
@@ -105,7 +105,7 @@ std::vector<NamedVersion> read_versions(const Cursor& where, const Polytope& pol
     for (std::size_t i = 0; i < n; ++i) {
         const Cursor entry = where.element(i), name = entry.member("name");
         claim(taken, name);
-        versions.push_back({name.text(), read_edits(entry.member("edits"), polytope, mattes)});
+        versions.push_back({name.text(), read_edits(entry.member("edits"), of)});
     }
     return versions;
 }

@@ -45,9 +45,6 @@ PickWindow read_window(const Cursor& where, Counts& counts) {
 
 Pick read_pick(const Cursor& where, const PickMattes& mattes, Counts& counts) {
     const Json& fields = where.json();
-    const auto number = [&](const char* name, double without) {
-        return fields.value(name, without);
-    };
     const auto frame = [&](const char* name) {
         return where.has(name) ? std::optional(where.member(name).number()) : std::nullopt;
     };
@@ -61,7 +58,7 @@ Pick read_pick(const Cursor& where, const PickMattes& mattes, Counts& counts) {
     pick.toward_colour = where.has("toward") && where.member("toward").is("colour");
     pick.from = frame("from");
     pick.until = frame("until");
-    pick.fade = number("fade", 0);
+    pick.fade = fields.value("fade", 0.0);
     pick.fade_out = frame("fade_out");
     pick.enabled = fields.value("enabled", true);
     counts.enabled += pick.enabled;
@@ -82,8 +79,8 @@ Pick read_pick(const Cursor& where, const PickMattes& mattes, Counts& counts) {
             points.limit(counts.points += points.size(), kMaxPoints, "points of areas in all");
         }
     }
-    pick.reach = number("reach", pick.reach);
-    pick.softness = number("softness", pick.softness);
+    pick.reach = fields.value("reach", pick.reach);
+    pick.softness = fields.value("softness", pick.softness);
     if (where.has("lightness")) {
         const Cursor range = where.member("lightness");
         pick.darkest = range.element(0).number();

@@ -50,15 +50,9 @@ Sidecar sidecar_of(const Json& members, const std::string& name) {
         sidecar.conversion = read_conversion(clip.member("conversion"));
     }
     sidecar.polytope = read_polytope(root.member("polytope"), sidecar.clip);
-    PickMattes& mattes = sidecar.mattes;
-    if (root.has("mattes")) mattes = read_mattes(root.member("mattes"), {});
-    mattes.frame_step = static_cast<double>(sidecar.clip.step);
-    mattes.width = static_cast<double>(sidecar.clip.width);
-    mattes.height = static_cast<double>(sidecar.clip.height);
-    sidecar.edits = read_edits(root.member("edits"), sidecar.polytope, mattes);
-    if (root.has("versions")) {
-        sidecar.versions = read_versions(root.member("versions"), sidecar.polytope, mattes);
-    }
+    if (root.has("mattes")) sidecar.mattes = read_mattes(root.member("mattes"), {});
+    sidecar.edits = read_edits(root.member("edits"), sidecar);
+    if (root.has("versions")) sidecar.versions = read_versions(root.member("versions"), sidecar);
     sidecar.play = play_in(root.json());
     if (root.has("colours")) check_colours(root.member("colours"));
     return sidecar;
@@ -73,10 +67,7 @@ Sidecar with_edits(const Sidecar& palette, const Json& edits, const Json& mattes
         check(root.member(part), sidecar_schema().member(part), kSidecarVersion);
     }
     result.mattes = read_mattes(root.member("mattes"), palette.mattes);
-    result.mattes.frame_step = palette.mattes.frame_step;
-    result.mattes.width = palette.mattes.width;
-    result.mattes.height = palette.mattes.height;
-    result.edits = read_edits(root.member("edits"), palette.polytope, result.mattes);
+    result.edits = read_edits(root.member("edits"), result);
     return result;
 }
 

@@ -53,8 +53,6 @@ struct PickMattes {
     };
     std::unordered_map<std::string, Grid> grids;  ///< by their ids
     std::shared_ptr<const DisplayCurve> display;
-    double frame_step = 1;         ///< Edits::frame_step
-    double width = 1, height = 1;  ///< of the clip
 };
 
 struct Sidecar {

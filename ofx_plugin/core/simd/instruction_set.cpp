@@ -53,17 +53,8 @@ const std::vector<InstructionSet>& instruction_sets() {
 }
 
 const char* name_of(InstructionSet set) {
-    switch (set) {
-        case InstructionSet::kBaseline:
-            return "baseline";
-        case InstructionSet::kAvx2:
-            return "avx2";
-        case InstructionSet::kAvx512:
-            return "avx512";
-        case InstructionSet::kBest:
-            break;
-    }
-    return "best";
+    static constexpr const char* kNames[] = {"best", "baseline", "avx2", "avx512"};
+    return kNames[static_cast<int>(set)];
 }
 
 InstructionSet resolved(InstructionSet set) {
