@@ -170,6 +170,41 @@ def test_without_landlock_5_no_process_is_signalled() -> None:
 
 
 @confines
+def test_no_open_file_has_signals_sent_or_others_changed(tmp_path: Path) -> None:
+    """An open file can send a signal to its owner, hold up who opens it, or change its version."""
+    own = tmp_path / "own"
+    own.write_text("mine")
+    program = (
+        "import fcntl, os, socket, sys\n"
+        "from palette4d.common import sandbox\n"
+        "sandbox._libc().prctl(38, 1, 0, 0, 0)\n"
+        "sandbox._filter_calls(False)\n"
+        "fine, _ = socket.socketpair()\n"
+        "fine.setblocking(False)\n"
+        "os.set_inheritable(fine.fileno(), True)\n"
+        "fcntl.fcntl(fine, fcntl.F_SETFL, fcntl.fcntl(fine, fcntl.F_GETFL))\n"
+        "own = os.open(sys.argv[1], os.O_RDONLY)\n"
+        "owner, version = 0x8901, 0x40087602\n"
+        "for ask in (\n"
+        "    lambda: fcntl.fcntl(fine, fcntl.F_SETOWN, os.getppid()),\n"
+        "    lambda: fcntl.fcntl(fine, 10, 9),\n"
+        "    lambda: fcntl.fcntl(fine, 15, bytes(8)),\n"
+        "    lambda: fcntl.fcntl(own, fcntl.F_SETLEASE, fcntl.F_RDLCK),\n"
+        "    lambda: fcntl.fcntl(os.open('/', os.O_RDONLY), fcntl.F_NOTIFY, 1),\n"
+        "    lambda: fcntl.ioctl(fine, owner, bytes(4)),\n"
+        "    lambda: fcntl.ioctl(own, version, bytes(8)),\n"
+        "):\n"
+        "    try:\n"
+        "        print(ask())\n"
+        "    except PermissionError:\n"
+        "        print('refused')\n"
+    )
+    words = [sys.executable, "-P", "-c", program, str(own)]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["refused"] * 7
+
+
+@confines
 @pytest.mark.parametrize("name", ["grade", ".hidden", "grade.of.a.shot"])
 def test_the_file_that_was_named_is_written_whatever_its_name(home: Path, name: str) -> None:
     words = f"analyze clip/ -o {name} --quiet --sandbox on".split()

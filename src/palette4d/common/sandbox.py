@@ -44,8 +44,12 @@ _EPERM, _ENOSYS = 1, 38
 _LOAD, _EQUAL, _AT_LEAST, _ANY_BIT, _RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
 _NEW_NAMESPACES, _THREAD = 0x7E020000, 0x00010000  # of clone: any CLONE_NEW…, CLONE_THREAD
 _LOCAL, _NO_STREAM = 1, 0b1110  # of socketpair: AF_UNIX, all types but SOCK_STREAM
-#: Of ioctl: TIOCSTI, TIOCLINUX type on the user's terminal; FS_IOC_SETFLAGS, FS_IOC_FSSETXATTR.
-_REFUSED_CONTROLS = (0x5412, 0x541C, 0x40086602, 0x401C5820)
+#: All that ioctl may do: TCGETS, TIOCGWINSZ, FIONREAD, FIONBIO, FIONCLEX, FIOCLEX, TCGETS2. Others
+#: type on the user's terminal, change flags of files, or have signals sent.
+_CONTROLS = (0x5401, 0x5413, 0x541B, 0x5421, 0x5450, 0x5451, 0x802C542A)
+#: Of fcntl: F_SETOWN, F_SETSIG, F_SETOWN_EX have a signal sent to any process; F_SETLEASE holds up
+#: who opens a file, F_NOTIFY tells of a folder.
+_REFUSED_COMMANDS = (8, 10, 15, 1024, 1026)
 # linux/capability.h
 _CAPABILITIES, _OPENING = 0x20080522, 0b1110  # version 3; DAC_OVERRIDE, DAC_READ_SEARCH, FOWNER
 
@@ -193,16 +197,19 @@ def _program(starts: bool) -> list[tuple[int, int, int, int]]:
             steps += [(_EQUAL, 0, 4, number(name)), (_LOAD, 0, 0, 16), (_EQUAL, 1, 0, own), deny]
             steps += [(_LOAD, 0, 0, 0)]
     # A fork would outlive the command; a datagram goes to any address, whatever its pair.
-    most = len(_REFUSED_CONTROLS)
+    most, last = len(_CONTROLS), len(_REFUSED_COMMANDS) - 1
     alone = [] if starts else [(_ANY_BIT, 1, 0, _THREAD), deny]
     steps += [
         *((_EQUAL, 0, 3 + len(alone), number("clone")), (_LOAD, 0, 0, 16)),
         *((_ANY_BIT, 0, 1, _NEW_NAMESPACES), deny, *alone, (_LOAD, 0, 0, 0)),
         *((_EQUAL, 0, 5, number("socketpair")), (_LOAD, 0, 0, 16), (_EQUAL, 0, 2, _LOCAL)),
         *((_LOAD, 0, 0, 24), (_ANY_BIT, 0, 1, _NO_STREAM), deny, (_LOAD, 0, 0, 0)),
-        *((_EQUAL, 0, 1 + most, number("ioctl")), (_LOAD, 0, 0, 24)),
-        *((_EQUAL, most - index, 0, call) for index, call in enumerate(_REFUSED_CONTROLS)),
-        *((_RETURN, 0, 0, _ALLOW), deny),
+        *((_EQUAL, 0, 4 + last, number("fcntl")), (_LOAD, 0, 0, 24)),
+        *((_EQUAL, last - i, int(i == last), asked) for i, asked in enumerate(_REFUSED_COMMANDS)),
+        *(deny, (_LOAD, 0, 0, 0)),
+        *((_EQUAL, 0, 2 + most, number("ioctl")), (_LOAD, 0, 0, 24)),
+        *((_EQUAL, most - i, 0, asked) for i, asked in enumerate(_CONTROLS)),
+        *(deny, (_RETURN, 0, 0, _ALLOW)),
     ]
     return steps
 
