@@ -7,6 +7,7 @@ import stat
 import subprocess
 import sys
 import time
+import uuid
 from pathlib import Path
 
 import pytest
@@ -151,6 +152,29 @@ def test_a_lock_file_of_a_dead_process_is_removed(
             document.save()
         assert path.read_bytes() == before
     lock.unlink()
+    document.save()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux alone says when it was started")
+def test_a_lock_of_another_machine_of_the_same_name_is_respected(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Machines of a farm may all be called localhost; a process that is alive there is not here."""
+    monkeypatch.setattr(locking, "LOCK_SECONDS", 0.3)
+    path = tmp_path / "clip.p4d.json"
+    path.write_bytes((GOLDEN / "v1_split.p4d.json").read_bytes())
+    document = Document.load(path)
+    document.set("v1", rgb=(0.5, 0.5, 0.5))
+    lock = tmp_path / ".clip.p4d.json.lock"
+    with locking.locked(path):
+        computer, _, token = lock.read_text().split()
+    start = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+    twin = computer.replace(start, str(uuid.uuid4()))
+    assert twin != computer
+    lock.write_text(f"{twin} {2**22 + 1} {token}")
+    with pytest.raises(Palette4dError, match="another program"):
+        document.save()
+    lock.write_text(f"{computer} {2**22 + 1} {token}")
     document.save()
 
 

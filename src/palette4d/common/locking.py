@@ -139,11 +139,15 @@ def _content(path: Path) -> str | None:
 
 
 def _computer() -> str:
-    """Return a name of this computer; containers count as computers of their own."""
-    space = ""
+    """Return a name of this computer since it was started.
+
+    Containers count as computers of their own, and so do two machines that are called `localhost`.
+    """
+    space = start = ""
     with contextlib.suppress(OSError):
         space = str(Path("/proc/self/ns/pid").readlink())
-    return f"{platform.node() or 'computer'}{space}".replace(" ", "_")
+        start = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+    return f"{platform.node() or 'computer'}{space}{start}".replace(" ", "_")
 
 
 def _is_dead(owner: str) -> bool:
