@@ -99,6 +99,16 @@ def test_few_keys_and_little_memory(clip: ArrayClip, monkeypatch: pytest.MonkeyP
     assert len(path) <= MOST_KEYS + 1
 
 
+def test_more_given_colours_than_frames_that_are_read_are_refused(
+    clip: ArrayClip, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The time grows with their third power: 20,000, as a sidecar may have, took hours."""
+    monkeypatch.setattr(follow, "MOST_FRAMES", 15)
+    follow.paths(clip, [start(frame) for frame in range(15)], (0, FRAMES - 1))
+    with pytest.raises(Palette4dError, match="found 16 frames where colours .* at most 15"):
+        follow.paths(clip, [start(frame) for frame in range(16)], (0, FRAMES - 1))
+
+
 def test_a_frame_that_the_clip_lacks_is_an_error(clip: ArrayClip) -> None:
     with pytest.raises(Palette4dError, match="no frame 99"):
         follow.paths(clip, [(99, (0.5, 0.5, 0.5))], (0, 42))

@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from palette4d.common.errors import Palette4dError
 from palette4d.grade import follow, follow_window
 from palette4d.grade.keyframes import MOST_KEYS
 from palette4d.grade.picks import Box, Pick, Window, WindowKey
@@ -92,6 +93,15 @@ def test_a_long_range_is_read_in_part(monkeypatch: pytest.MonkeyPatch) -> None:
     )
     assert seen[-1] == 13
     assert max(off(keys, t) for t in range(FRAMES)) < 2
+
+
+def test_more_given_boxes_than_frames_that_are_read_are_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(follow, "MOST_FRAMES", 12)
+    clip = clip_of([picture(t) for t in range(FRAMES)])
+    with pytest.raises(Palette4dError, match="found 13 frames where boxes .* at most 12"):
+        follow_window.boxes(clip, {t: box(t) for t in range(13)}, (0, FRAMES - 1))
 
 
 def test_given_boxes_are_met_and_their_size_is_between() -> None:

@@ -14,6 +14,7 @@ import palette4d
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.grade import mattes
+from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.document import Document
 from palette4d.grade.picks import Area, Pick
 from palette4d.media.array_clip import ArrayClip
@@ -261,6 +262,25 @@ def test_a_log_clip_is_told_apart_as_its_picture_is(pictures: F32) -> None:
         taken.append(learned.odds > learned.odds.max() / 2)
     either, both = np.any(taken, axis=0), np.all(taken, axis=0)
     assert both.sum() > 0.95 * either.sum()
+
+
+@pytest.mark.parametrize("kind", ["pick", "hold"])
+def test_a_sidecar_that_names_each_frame_does_not_fill_the_memory(
+    document: Document, pictures: F32, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    """A small file may have 100,000 areas; picks already learned keep no frames either."""
+    monkeypatch.setattr(mattes, "MOST_SAMPLES", pictures[0].size)
+    areas = [Area(frame, ((60.0, 45.0),), 4.0) for frame in range(FRAMES)]
+    make = document.pick if kind == "pick" else document.hold
+    change = {"to": "#2040b0"} if kind == "pick" else {}
+    with pytest.raises(Palette4dError, match=f"{FRAMES} frames, .* at most 4 of this size"):
+        make(0, pixel=CLICK, box=9, areas=areas, follow=False, **change)
+    assert not document.grade.picks
+    make(0, pixel=CLICK, box=9, areas=areas[:2], follow=False, until=1, **change)
+    clip = ClipOfPicks.of(document.grade)
+    for frame in range(FRAMES):
+        np.testing.assert_array_equal(clip.read(frame), pictures[frame])
+    assert list(clip._read) == [2, 3, 4, 5]
 
 
 def test_frames_that_a_hold_marks_are_read(pictures: F32) -> None:

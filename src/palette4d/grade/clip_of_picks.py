@@ -19,7 +19,7 @@ from palette4d.grade import follow, follow_window
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.follow import Progress
 from palette4d.grade.grade import Grade
-from palette4d.grade.mattes import Display, Learned, learn
+from palette4d.grade.mattes import Display, Learned, learn, most_frames
 from palette4d.grade.picks import ALIKE, PathKey, Pick, Window
 from palette4d.media.clip_base import describe
 from palette4d.media.proxy_clip import ProxyClip, is_proxy
@@ -181,6 +181,8 @@ class ClipOfPicks:
             if self._conversion is not None:
                 colours = np.asarray(self._conversion.to_palette(colours), np.float32)
             self._read[frame] = np.ascontiguousarray(colours)
+            if len(self._read) > most_frames(colours.size):
+                del self._read[next(iter(self._read))]
         return self._read[frame]
 
     def learn(self, pick: Pick, holds: Sequence[Pick], display: Display | None) -> Learned | None:

@@ -10,7 +10,7 @@ object's. One pass reads the frames; memory holds at most `MOST_COLOURS` colours
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,6 +78,7 @@ def paths(
         span; keys at `starts` are marked as given. `there` falls to 0 where the path ends.
     """
     known = dict(sorted(starts))
+    check_given(known, "colours")
     for frame in known:
         if frame not in clip.frames:
             raise Palette4dError(
@@ -105,6 +106,15 @@ def paths(
         PathKey(frames[i], as_colour(path[i, :3]), frames[i] in known, float(path[i, 3]))
         for i in kept
     )
+
+
+def check_given(known: Mapping[int, object], what: str) -> None:
+    """Refuse more places where something is known than frames are read between them."""
+    if len(known) > MOST_FRAMES:
+        raise Palette4dError(
+            f"found {len(known)} frames where {what} of the pick are given, expected at most "
+            f"{MOST_FRAMES}; pick it again"
+        )
 
 
 def read_colours(

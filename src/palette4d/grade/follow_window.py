@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
-from palette4d.grade.follow import MOST_FRAMES, Progress
+from palette4d.grade.follow import MOST_FRAMES, Progress, check_given
 from palette4d.grade.keyframes import needed
 from palette4d.grade.mattes import Display
 from palette4d.grade.picks import Box, WindowKey, as_box
@@ -152,6 +152,7 @@ def boxes(
         span, or where the box is lost: from there on it stays (`Pick.lost`).
     """
     known = dict(sorted(given.items()))
+    check_given(known, "boxes")
     low, high = min(span[0], *known), max(span[1], *known)
     inside = [frame for frame in clip.frames if low <= frame <= high]
     every = -(-len(inside) // MOST_FRAMES)

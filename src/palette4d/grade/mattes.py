@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.grade.picks import Pick
+from palette4d.media.clip_base import MOST_SAMPLES
+from palette4d.media.source_clip import nearest
 
 F32 = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
@@ -85,19 +87,31 @@ def learn(
     read: ReadFrame,
     display: Display | None,
 ) -> Learned:
-    """Learn the matte of a pick or hold from `frames` of its clip; `holds` are background."""
-    chosen = [_nearest(frames, pick.frame)]
-    chosen += [_nearest(frames, area.frame) for area in pick.areas]
-    seeded = list(dict.fromkeys(chosen))
-    others = [_nearest(frames, area.frame) for hold in holds for area in hold.marks]
-    others += _along(pick, frames)
-    others = [frame for frame in dict.fromkeys(others) if frame not in seeded]
+    """Learn the matte of a pick or hold from `frames` of its clip; `holds` are background.
+
+    Raises
+    ------
+    Palette4dError
+        Areas and holds are in more frames than fit in memory (`most_frames`).
+    """
+    own, background = _brushes([pick], frames), _brushes(holds, frames)
+    first = nearest(frames, pick.frame)
+    seeded = dict.fromkeys([first, *(nearest(frames, area.frame) for area in pick.areas)])
+    others = dict.fromkeys([*background, *_along(pick, frames)])
+    chosen = [*seeded, *(frame for frame in others if frame not in seeded)]
+    image = read(first)
+    if len(chosen) > (most := most_frames(image.size)):
+        raise Palette4dError(
+            f"{pick.id} would be learned from {len(chosen)} frames, in which it and holds have "
+            f"areas; expected at most {most} of this size. Remove holds, or pick it again with "
+            "fewer areas"
+        )
     given = []
-    for frame in [*seeded, *others]:
-        own = _brushes(pick, frame, frames)
-        background = [brush for hold in holds for brush in _brushes(hold, frame, frames)]
+    for frame in chosen:
         colour = tuple(pick.colour_at(frame).tolist())
-        given.append((read(frame), colour, own, background, frame in seeded))
+        places = own.get(frame, []), background.get(frame, [])
+        pixels = image if frame == first else read(frame)
+        given.append((pixels, colour, *places, frame in seeded))
     learned = _core.learn_matte(
         given,
         pick.rgb,
@@ -107,17 +121,21 @@ def learn(
     return Learned(learned["odds"].reshape(-1), learned["found"])
 
 
-def _brushes(pick: Pick, frame: int, frames: Sequence[int]) -> list[Brush]:
-    """Return the places of a frame that a pick or hold names: points and a radius each."""
-    return [
-        (list(area.points), float(area.radius))
-        for area in pick.marks
-        if _nearest(frames, area.frame) == frame
-    ]
+def most_frames(samples: int) -> int:
+    """Return how many frames with so many samples are in memory at most.
+
+    They are no larger than those of a pick in the largest clip: a sidecar can name each frame.
+    """
+    return (1 + FURTHER_FRAMES) * MOST_SAMPLES // samples
 
 
-def _nearest(frames: Sequence[int], frame: float) -> int:
-    return min(frames, key=lambda number: (abs(number - frame), number))
+def _brushes(picks: Sequence[Pick], frames: Sequence[int]) -> dict[int, list[Brush]]:
+    """Return the places of frames that picks or holds name: points and a radius each."""
+    found: dict[int, list[Brush]] = {}
+    for area in (area for pick in picks for area in pick.marks):
+        brush = (list(area.points), float(area.radius))
+        found.setdefault(nearest(frames, area.frame), []).append(brush)
+    return found
 
 
 def _along(pick: Pick, frames: Sequence[int]) -> list[int]:

@@ -1,6 +1,7 @@
 """The clip of a sidecar: given by the user, or found at the path in the sidecar."""
 
-from collections.abc import Mapping
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +47,13 @@ def find_clip(sidecar_path: Path, clip: Mapping[str, Any], given: str | None) ->
 
 def nearest_frame(clip: Clip, frame: float) -> int:
     """Return the clip's frame number nearest to `frame`; the earlier of two."""
-    return min(clip.frames, key=lambda number: (abs(number - frame), number))
+    return nearest(clip.frames, frame)
+
+
+def nearest(frames: Sequence[int], frame: float) -> int:
+    """Return the number nearest to `frame` among rising ones; the earlier of two."""
+    at = bisect_left(frames, frame)
+    return min(frames[max(0, at - 1) : at + 1], key=lambda number: (abs(number - frame), number))
 
 
 def frame_colours(
