@@ -20,6 +20,7 @@ from farm_processes import wait_for
 
 from palette4d.common import sandbox, writer
 from palette4d.common.errors import Palette4dError
+from palette4d.media.clip_files import files_of_sidecar
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 
@@ -143,6 +144,23 @@ def test_links_of_a_clip_lead_to_clips_alone(home: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert told(done) == [[]]
     assert len(list(home.glob("o.*.exr"))) == 6
+
+
+@confines
+@pytest.mark.parametrize("source", ["/dev/x.####.png", "notes/x.mov", "notes", "gone/x.png"])
+def test_a_folder_that_a_sidecar_names_is_opened_for_the_clip_in_it_alone(
+    home: Path, source: str
+) -> None:
+    (home / "grades" / "notes").mkdir(parents=True)
+    (home / "grades" / "notes" / "diary.txt").touch()
+    own = home / "grades" / "own.p4d.json"
+    text = json.loads((GOLDEN / "v2_picks.p4d.json").read_text())
+    text["clip"]["source"] = source
+    own.write_text(json.dumps(text))
+    assert set(files_of_sidecar(own)) == {own, own.parent}
+    shutil.copy(home / "clip" / "frame.0001.png", own.parent / "notes" / "x.0001.png")
+    opened = {own, own.parent, *([own.parent / "notes"] if "notes" in source else [])}
+    assert set(files_of_sidecar(own)) == opened
 
 
 @confines

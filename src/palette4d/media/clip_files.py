@@ -17,13 +17,25 @@ SIDECARS = frozenset({"p4d.json", "shots.json"})
 
 
 def files_of(spec: str) -> Iterator[Path]:
-    """Yield what a confined process must read to open a clip, by its name for `open_clip`."""
+    """Yield what a confined process must read to open a clip, by its name for `open_clip`.
+
+    Nothing where no clip is: a sidecar could name /dev.
+    """
     path = Path(spec if Path(spec).exists() else split(spec)[0])
     if path.is_file() and extension(path) in MOVIE_EXTENSIONS:
         if extension(Path(os.path.realpath(path))) in MOVIE_EXTENSIONS:  # not a link to a key
             yield path
     else:
-        yield from sandbox.parts(path if path.is_dir() else path.parent, IMAGE_EXTENSIONS)
+        folder = path if path.is_dir() else path.parent
+        if _has_images(folder):
+            yield from sandbox.parts(folder, IMAGE_EXTENSIONS)
+
+
+def _has_images(folder: Path) -> bool:
+    try:
+        return any(extension(name) in IMAGE_EXTENSIONS for name in os.listdir(folder))
+    except OSError:
+        return False
 
 
 def files_of_sidecar(path: Path, clip: str | None = None) -> Iterator[Path]:
