@@ -105,7 +105,7 @@ def test_more_given_colours_than_frames_that_are_read_are_refused(
     """The time grows with their third power: 20,000, as a sidecar may have, took hours."""
     monkeypatch.setattr(follow, "MOST_FRAMES", 15)
     follow.paths(clip, [start(frame) for frame in range(15)], (0, FRAMES - 1))
-    with pytest.raises(Palette4dError, match="found 16 frames where colours .* at most 15"):
+    with pytest.raises(Palette4dError, match=r"found 16 frames where colours .* at most 15"):
         follow.paths(clip, [start(frame) for frame in range(16)], (0, FRAMES - 1))
 
 

@@ -100,7 +100,7 @@ def test_more_given_boxes_than_frames_that_are_read_are_refused(
 ) -> None:
     monkeypatch.setattr(follow, "MOST_FRAMES", 12)
     clip = clip_of([picture(t) for t in range(FRAMES)])
-    with pytest.raises(Palette4dError, match="found 13 frames where boxes .* at most 12"):
+    with pytest.raises(Palette4dError, match=r"found 13 frames where boxes .* at most 12"):
         follow_window.boxes(clip, {t: box(t) for t in range(13)}, (0, FRAMES - 1))
 
 

@@ -33,7 +33,7 @@ def files_of(spec: str) -> Iterator[Path]:
 
 def _has_images(folder: Path) -> bool:
     try:
-        return any(extension(name) in IMAGE_EXTENSIONS for name in os.listdir(folder))
+        return any(extension(path) in IMAGE_EXTENSIONS for path in folder.iterdir())
     except OSError:
         return False
 
