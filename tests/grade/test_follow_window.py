@@ -104,6 +104,24 @@ def test_more_given_boxes_than_frames_that_are_read_are_refused(
         follow_window.boxes(clip, {t: box(t) for t in range(13)}, (0, FRAMES - 1))
 
 
+@pytest.mark.parametrize("box", [(1, 100, 6, 120), (0, 0, 8, 20000)])
+def test_of_a_tall_picture_no_more_pixels_are_kept_than_of_another(
+    monkeypatch: pytest.MonkeyPatch, box: Box
+) -> None:
+    monkeypatch.setattr(follow_window, "WIDTH", 100)
+    kept, middles = [], follow_window._middles
+
+    def seen(greys: list[NDArray[np.int8]], *rest: object) -> object:
+        kept.extend(grey.size for grey in greys)
+        return middles(greys, *rest)
+
+    monkeypatch.setattr(follow_window, "_middles", seen)
+    pictures = np.random.default_rng(1).random((3, 20000, 8, 3), np.float32)
+    keys = follow_window.boxes(ArrayClip(pictures), {1: box}, (0, 2))
+    assert max(kept) <= 100**2
+    assert any(key.box == box for key in keys)
+
+
 def test_given_boxes_are_met_and_their_size_is_between() -> None:
     clip = clip_of([picture(t) for t in range(FRAMES)])
     given = {4: box(4), 20: box(20, 60)}

@@ -28,8 +28,9 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 I8 = NDArray[np.int8]
 
-#: Pixels of a box's longer side, and of a picture's width, to which frames are reduced at most.
-#: More: the place is known better, in more time and memory.
+#: Pixels of a box's longer side, and of a picture's width, to which frames are reduced at most; of
+#: a tall picture, the side of a square of as many pixels. More: the place is known better, in more
+#: time and memory.
 SIDE, WIDTH = 128, 960
 #: How far the box may move from a frame to the next, as shares of its longer side and of the
 #: picture's width; the larger one counts. More: faster things are followed, in more time.
@@ -158,7 +159,9 @@ def boxes(
     every = -(-len(inside) // MOST_FRAMES)
     frames = sorted({*inside[::every], inside[-1], *known})
     longest = max(float(np.ptp(part)) for box in known.values() for part in _inside(clip, box))
-    scale = max(1, math.ceil(longest / SIDE), math.ceil(clip.width / WIDTH))
+    broad = max(clip.width, math.sqrt(clip.width * clip.height))
+    scale = max(1, math.ceil(longest / SIDE), math.ceil(broad / WIDTH))
+    scale = min(scale, clip.width, clip.height)
     side = math.ceil(longest / scale)
     greys = _read(clip, frames, (scale, side), (conversion, display), progress)
     starts = [frames.index(frame) for frame in known]
