@@ -43,6 +43,7 @@ from palette4d.studio.inspector import Inspector
 from palette4d.studio.instance import Listener
 from palette4d.studio.menu_actions import MenuActions
 from palette4d.studio.menu_entries import ACTIONS, Action
+from palette4d.studio.no_objects import refuse_objects
 from palette4d.studio.paths import sequence_of
 from palette4d.studio.preferences import DISPLAY
 from palette4d.studio.scopes_view import Scopes
@@ -74,6 +75,7 @@ class Window(QMainWindow):
     def __init__(self, session: Session, settings: QSettings | None = None) -> None:
         """Make all views."""
         super().__init__()
+        refuse_objects()
         self.session = session
         self.settings = settings if settings is not None else QSettings("palette4d", "studio")
         session.post = Post(self).post
