@@ -179,3 +179,8 @@ def test_a_dropped_folder_opens_its_sequence(window: Window, sidecar: Path) -> N
     assert window.session.clip is not None
     assert len(window.session.clip.frames) == 12
     assert window.session.document is None
+
+
+def test_the_root_folder_is_no_clip(window: Window) -> None:
+    drop(window, "/")
+    assert window.session.status.level == "error"

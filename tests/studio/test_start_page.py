@@ -34,7 +34,9 @@ def test_recent_files_have_pictures_and_open(
     assert not page.isVisible()
 
 
-@pytest.mark.parametrize("kept", [True, 5, b"\xff", {"a": 1}, ["x" * 9999, "/dev/zero", 7, ""]])
+@pytest.mark.parametrize(
+    "kept", [True, 5, b"\xff", {"a": 1}, ["x" * 9999, "/dev/zero", 7, "", "x\0"]]
+)
 def test_settings_that_hold_anything_stop_no_window(
     window: Window, sidecar: Path, kept: Any
 ) -> None:

@@ -120,7 +120,7 @@ class FileMenu:
     def _listed(self, name: str) -> list[str]:
         found: Any = self.window.settings.value(name, [])
         listed = found if isinstance(found, list) else [found]  # the file may hold anything
-        return [each for each in listed if isinstance(each, str)]
+        return [each for each in listed if isinstance(each, str) and "\0" not in each]
 
     def open_shot(self, path: Path) -> None:
         """Open a shot of the list."""

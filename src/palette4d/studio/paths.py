@@ -54,7 +54,7 @@ def sidecar_of(path: str) -> Path | None:
         with contextlib.suppress(ClipError):
             names.append(clip_sequence.of_pattern(path)[0].name)
     for name in dict.fromkeys(names):
-        candidate = found.absolute().with_name(f"{name}.p4d.json")
+        candidate = found.absolute().parent / f"{name}.p4d.json"
         if name and candidate.is_file():
             return candidate
     if found.is_dir():  # or in the folder, beside its frames
