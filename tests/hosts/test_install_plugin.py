@@ -21,6 +21,7 @@ from palette4d.cli import install_plugin
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import temporary_folder
 from palette4d.common.text import quoted
+from palette4d.hosts import bundle as bundles
 from palette4d.hosts.bundle import (
     BUNDLE,
     PROGRAM,
@@ -118,6 +119,19 @@ def test_root_installs_nothing_that_another_user_could_change(
     with pytest.raises(Palette4dError, match="root"):
         install_bundle(given, tmp_path / "OFX")
     assert not (tmp_path / "OFX").exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs root")
+def test_root_installs_no_sources_of_another_user(
+    bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in an editable installation (`pip install -e`) of a folder of theirs."""
+    sources = tmp_path / "sources"
+    sources.mkdir()
+    monkeypatch.setattr(bundles, "__file__", str(sources))
+    os.chown(sources, 12345, 12345)
+    with pytest.raises(Palette4dError, match=r"sources .*belongs to another user"):
+        install_bundle(bundle, tmp_path / "OFX")
 
 
 def test_replaces_an_earlier_version(bundle: Path, tmp_path: Path) -> None:

@@ -144,7 +144,8 @@ def _reason(error: OSError) -> str:
 
 def _refuse_others_program(bundle: Path) -> None:
     """Check that root alone may change what all users' nodes will run."""
-    for path in (Path(sys.executable), Path(sys.prefix), bundle):
+    # This file: an editable installation runs its sources, which lie elsewhere.
+    for path in (Path(sys.executable), Path(sys.prefix), Path(__file__), bundle):
         problem = changeable(path)
         if problem is not None:
             raise Palette4dError(
