@@ -324,7 +324,7 @@ class TestRefusals:
         assert done.returncode == 1
         assert "pip install 'palette4d[farm]'" in done.stderr
 
-    @pytest.mark.parametrize("text", ["", "farm", "tcp://farm", "farm:", "a b:1"])
+    @pytest.mark.parametrize("text", ["", "farm", "tcp://farm", "farm:", "a b:1", "inproc://x:1"])
     def test_addresses(self, text: str) -> None:
         with pytest.raises(Palette4dError, match="scheduler's address"):
             farms.check_address(text)

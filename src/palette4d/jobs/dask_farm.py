@@ -44,7 +44,7 @@ WATCHED_EVERY = 5
 
 def check_address(text: str) -> str:
     """Return the value of --cluster if it is a scheduler's address."""
-    if re.fullmatch(r"([a-z]+://)?[^/:\s]+:[0-9]+", text):
+    if re.fullmatch(r"((tcp|tls|wss?)://)?[^/:\s]+:[0-9]+", text):
         return text
     raise Palette4dError(
         f"found {text!r}, expected a Dask scheduler's address such as tls://farm.example:8786"
