@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socketserver
 import subprocess
 import sys
 import threading
@@ -323,6 +324,22 @@ class TestRefusals:
         done = run_without("distributed", tmp_path, *words)
         assert done.returncode == 1
         assert "pip install 'palette4d[farm]'" in done.stderr
+
+    def test_what_is_no_scheduler(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(farms, "ANSWERS_WITHIN", 5)
+
+        class Rubbish(socketserver.BaseRequestHandler):
+            def handle(self) -> None:
+                self.request.sendall(b"\x7f" * 64)
+                self.request.recv(1)
+
+        with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Rubbish) as server:
+            server.daemon_threads = True
+            threading.Thread(target=server.serve_forever, daemon=True).start()
+            address = "tcp://{}:{}".format(*server.server_address)
+            with pytest.raises(Palette4dError, match="no Dask scheduler answers"):
+                farms.run(address, piece, {0: 1}, lambda key, found: None)
+            server.shutdown()
 
     @pytest.mark.parametrize("text", ["", "farm", "tcp://farm", "farm:", "a b:1", "inproc://x:1"])
     def test_addresses(self, text: str) -> None:

@@ -250,7 +250,7 @@ def _connected(address: str) -> Iterator[Any]:
         )
     try:
         client = distributed.Client(address, timeout=ANSWERS_WITHIN, set_as_default=False)
-    except (OSError, TimeoutError, ValueError) as error:
+    except Exception as error:  # what answers may be no scheduler: any of the library's
         raise Palette4dError(
             f"no Dask scheduler answers at {address} ({error}); start one with `dask scheduler`, "
             f"workers with `dask worker`, check the address, or use {Arg('jobs')}"
