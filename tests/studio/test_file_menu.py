@@ -184,3 +184,8 @@ def test_a_dropped_folder_opens_its_sequence(window: Window, sidecar: Path) -> N
 def test_the_root_folder_is_no_clip(window: Window) -> None:
     drop(window, "/")
     assert window.session.status.level == "error"
+
+
+def test_of_many_recent_files_the_newest_are_listed(window: Window) -> None:
+    window.settings.setValue("recent", [f"{k}.p4d.json" for k in range(20_000)])
+    assert window.files.recent_files() == [f"{k}.p4d.json" for k in range(10)]

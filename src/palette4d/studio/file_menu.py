@@ -142,7 +142,7 @@ class FileMenu:
 
     def recent_files(self) -> list[str]:
         """Return the recent files, the newest first."""
-        return self._listed("recent")
+        return self._listed("recent")[:RECENT]
 
     def fill_recent(self) -> None:
         """Fill the menu of the recent files."""
