@@ -25,6 +25,7 @@ from PySide6.QtWidgets import QApplication
 
 from palette4d.cli.main import main
 from palette4d.studio import theme
+from palette4d.studio.application import Application
 from palette4d.studio.session import Session
 from palette4d.studio.window import Window
 
@@ -49,6 +50,12 @@ def sidecar(analysed: Path, tmp_path: Path) -> Path:
     path.write_bytes((analysed / "clip.p4d.json").read_bytes())
     shutil.copytree(analysed / "clip", tmp_path / "clip", copy_function=os.link)
     return path
+
+
+@pytest.fixture(scope="session")
+def qapp_cls() -> type[Application]:
+    """The application that pytest-qt makes."""
+    return Application
 
 
 @pytest.fixture

@@ -12,11 +12,13 @@ from typing import Any
 import OpenImageIO as oiio
 import pytest
 from PySide6.QtCore import QObject
+from PySide6.QtGui import QFileOpenEvent
 from PySide6.QtNetwork import QLocalSocket
 
 from palette4d.cli.main import main
 from palette4d.common.errors import Palette4dError
 from palette4d.studio import app, instance
+from palette4d.studio.application import Application
 from palette4d.studio.window import Window
 
 
@@ -156,3 +158,13 @@ def test_a_socket_of_another_user_is_no_window(opened: Window, sidecar: Path, qt
     os.chown(found.fullServerName(), 12345, -1)
     assert not brought_forward(sidecar, qtbot)
     assert opened.session.frame != 9
+
+
+def test_a_file_of_the_finder_is_opened(
+    qapp: Application, window: Window, sidecar: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On macOS a double click is no argument of the command: the running program is told."""
+    monkeypatch.setattr(qapp, "open_path", window.open_path)
+    qapp.sendEvent(qapp, QFileOpenEvent(str(sidecar)))
+    assert window.session.document is not None
+    assert window.session.document.path == sidecar

@@ -113,11 +113,12 @@ def run(
 
     from palette4d.plotting import style
     from palette4d.studio import theme
+    from palette4d.studio.application import Application
     from palette4d.studio.instance import bring_forward
     from palette4d.studio.session import Session
     from palette4d.studio.window import Window
 
-    app = QApplication.instance() or QApplication(["palette4d"])
+    app = QApplication.instance() or Application(["palette4d"])
     assert isinstance(app, QApplication)
     if not hidden and path is not None and bring_forward(path, frame):
         return 0
@@ -130,6 +131,8 @@ def run(
     if hidden:  # a picture does not depend on who draws it
         settings = QSettings(nowhere.filePath("studio.ini"), QSettings.Format.IniFormat)
     window = Window(session, settings)
+    if isinstance(app, Application):
+        app.open_path = window.open_path
     wanted = QSize(*(size or USUAL_SIZE))
     if not hidden:
         wanted = wanted.boundedTo(app.primaryScreen().availableSize() - QSize(*RIMS))
