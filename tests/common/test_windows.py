@@ -11,10 +11,12 @@ from pathlib import Path
 import pytest
 from wine import WINE
 
+import palette4d
 from palette4d.common.errors import Palette4dError, WriteError
-from palette4d.common.files import replacing
+from palette4d.common.files import refuse_existing, replacing
 from palette4d.common.locking import locked
 from palette4d.common.text import quoted
+from palette4d.shows.find_media import local_path
 
 if sys.platform != "win32":
     pytest.skip("Windows alone", allow_module_level=True)
@@ -121,3 +123,82 @@ def test_words_are_quoted_as_the_shell_takes_them(tmp_path: Path) -> None:
         line = f'{quoted(sys.executable)} -c "import sys; print(sys.argv[1])" {quoted(word)}'
         done = subprocess.run(line, capture_output=True, text=True, check=True)
         assert done.stdout.strip() == os.fspath(word)
+
+
+def test_names_in_other_letters_are_one_file(tmp_path: Path) -> None:
+    clip = tmp_path / "Clip.mov"
+    clip.write_bytes(b"frames")
+    with pytest.raises(Palette4dError, match="read for this output"):
+        refuse_existing(tmp_path / "CLIP.MOV", force=True, inputs=[clip])
+    with locked(clip), pytest.raises(FileExistsError):
+        (tmp_path / ".CLIP.MOV.LOCK").open("x")
+
+
+@pytest.mark.parametrize(
+    ("named", "path"),
+    [
+        (r"S:\show\a.mov", r"S:\show\a.mov"),
+        ("S:/show/a.mov", r"S:\show\a.mov"),
+        (r"\\server\share\a.mov", r"\\server\share\a.mov"),
+        ("file:///S:/my%20show/a.mov", r"S:\my show\a.mov"),
+        ("file://localhost/S:/a.mov", r"S:\a.mov"),
+        ("file://server/share/a.mov", r"\\server\share\a.mov"),
+    ],
+)
+def test_media_on_drives_and_servers(named: str, path: str) -> None:
+    assert str(local_path(named)) == path
+
+
+@pytest.fixture
+def sidecar(tmp_path: Path) -> Path:
+    """A sidecar with a palette of one colour's neighbours."""
+    path = tmp_path / "a.p4d.json"
+    golden = Path(__file__).parents[1] / "golden" / "sidecars" / "v1_edited.p4d.json"
+    path.write_bytes(golden.read_bytes())
+    return path
+
+
+def test_paths_are_longer_than_260_characters(sidecar: Path) -> None:
+    """Windows asks for this in its registry; Wine always allows it."""
+    folder = sidecar.parent
+    while len(str(folder)) < 300:
+        folder /= "a long name with blanks " * 2 + "色"
+        folder.mkdir()
+    with locked(folder / "b.p4d.json") as held:
+        held()
+        with replacing(folder / "b.p4d.json") as temporary:
+            temporary.write_bytes(sidecar.read_bytes())
+    document = palette4d.Document.load(folder / "b.p4d.json")
+    assert repr(document) == repr(palette4d.Document.load(sidecar))
+
+
+def test_line_ends_of_windows_are_read_and_not_written(sidecar: Path) -> None:
+    sidecar.write_bytes(sidecar.read_bytes().replace(b"\n", b"\r\n"))
+    document = palette4d.Document.load(sidecar)
+    document.reset()
+    document.save()
+    assert b"\r" not in sidecar.read_bytes()
+
+
+@pytest.mark.parametrize("utf8", ["0", "1"])
+def test_no_code_page_is_asked(tmp_path: Path, utf8: str) -> None:
+    """What goes to files and pipes is UTF-8, whatever Windows' code page is."""
+    done = subprocess.run(
+        [sys.executable, "-m", "palette4d", "info", "Grüße 色.p4d.json"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONUTF8": utf8},
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "Grüße 色.p4d.json" in done.stderr.decode("utf-8")
+
+
+def test_a_process_is_asked_and_not_ended() -> None:
+    """Windows ends a process that gets any signal of os.kill."""
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
+        assert not windows.has_ended(process.pid)
+        time.sleep(0.2)
+        assert process.poll() is None
+        process.communicate(b"\n")
+        assert process.returncode == 0

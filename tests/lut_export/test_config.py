@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -199,8 +200,9 @@ def test_variables_of_the_environment(
 def test_frames_between_take_the_nearest_table(shot: Path, tmp_path: Path) -> None:
     done = write_config([shot], tmp_path / "show", **options(4))
     tables = tmp_path / "show" / "luts" / "cube"
-    baked = sorted(p.name for p in tables.glob("*.clf") if not p.is_symlink())
-    assert baked == ["cube.0.clf", "cube.4.clf", "cube.8.clf"]
+    if os.name != "nt":  # copies there
+        baked = sorted(p.name for p in tables.glob("*.clf") if not p.is_symlink())
+        assert baked == ["cube.0.clf", "cube.4.clf", "cube.8.clf"]
     for frame, nearest in ((1, 0), (2, 0), (3, 4), (6, 4), (7, 8), (10, 8)):
         got = shown(done.path, {"FRAME": str(frame)}, look("cube"))
         want = shown(done.path, {"FRAME": str(nearest)}, look("cube"))
@@ -210,6 +212,7 @@ def test_frames_between_take_the_nearest_table(shot: Path, tmp_path: Path) -> No
     np.testing.assert_array_equal(shown(moved, {"FRAME": "10"}, look("cube")), got)
 
 
+@links
 def test_more_tables_replace_links(shot: Path, tmp_path: Path) -> None:
     write_config([shot], tmp_path / "show", **options(4))
     done = write_config([shot], tmp_path / "show", **options(2, force=True))
