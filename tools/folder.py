@@ -1,11 +1,11 @@
-"""`make windows-zip`, `make linux-tar`: a folder with Python and all else, for a double click.
+"""`make windows-zip`, `linux-tar`, `macos-zip`: a folder with all that palette4d needs.
 
     python tools/folder.py FOLDER BILL [ARCHIVE]
 
 FOLDER holds python/, with palette4d and what it needs installed (tools/windows_python.sh,
-tools/linux_python.sh). It loses what palette4d never uses, and gets the licences and BILL, the list
-of what is in it (CycloneDX). With ARCHIVE it is for Windows: it also gets launchers, and is packed
-into that .zip. Needs distlib.
+tools/linux_python.sh, tools/macos_app.sh). It loses what palette4d never uses, and gets the
+licences and BILL, the list of what is in it (CycloneDX). With ARCHIVE it is packed into that .zip:
+the .app that it lies in, or else it is for Windows and gets launchers. Needs distlib.
 """
 
 from __future__ import annotations
@@ -41,10 +41,12 @@ QT_USED = (
     "msvcp140*.dll", "vcruntime140*.dll", "opengl32sw.dll", "QtCore.*", "QtGui.*", "QtNetwork.*",
     "QtWidgets.*", "plugins/platforms/qoffscreen.dll", "plugins/platforms/qwindows.dll",
     "plugins/styles/*", "plugins/imageformats/qico.dll", "plugins/imageformats/qjpeg.dll",
-    "libpyside6*", "Qt/lib/libQt6[CGNWDX]*", "Qt/lib/libQt6OpenGL.*", "Qt/lib/libicu*",
-    "Qt/plugins/platforms/*", "Qt/plugins/platforminputcontexts/*", "Qt/plugins/platformthemes/*",
+    "libpyside6.*", "Qt/lib/libQt6[CGNWDX]*", "Qt/lib/libQt6OpenGL.*", "Qt/lib/libicu*",
+    "Qt/plugins/platforms/*", "Qt/plugins/platformthemes/*",
+    "Qt/plugins/platforminputcontexts/lib[ci]*",
     "Qt/plugins/wayland-*/*", "Qt/plugins/xcbglintegrations/*", "Qt/plugins/imageformats/libqico.*",
-    "Qt/plugins/imageformats/libqjpeg.*",
+    "Qt/plugins/imageformats/libqjpeg.*", "Qt/plugins/styles/*",
+    *(f"Qt/lib/Qt{part}.framework/**/*" for part in ("Core", "DBus", "Gui", "Network", "Widgets")),
 )  # fmt: skip
 
 LICENCES = """\
@@ -53,7 +55,7 @@ listed below; their licences lie here, and palette4d.cdx.json lists them for pro
 
 PyAV's libraries are FFmpeg with x264 and x265, under the GNU General Public License. So the folder
 as a whole may be passed on under version 3 of that licence (GPL-3). Qt is under the LGPL-3: you may
-replace its DLLs by your own. You get the sources of
+replace its libraries by your own. You get the sources of
 
   FFmpeg, x264, x265 and PyAV   https://github.com/PyAV-Org/pyav-ffmpeg, with the versions and the
                                 commands of the build, and https://github.com/PyAV-Org/PyAV
@@ -115,8 +117,9 @@ def licences(packages: Path, out: Path) -> None:
             if path.is_file() and path.name.upper().startswith(("LICEN", "COPYING", "NOTICE")):
                 folder.mkdir(parents=True, exist_ok=True)
                 shutil.copy(path, folder)
-    (python,) = [*packages.parents[1].glob("LICENSE.txt"), *packages.parent.glob("LICENSE.txt")]
-    shutil.copy(python, out / "python.txt")
+    # Windows' Python has it beside its programs, Linux's among its modules; an .app has no Python.
+    for python in [*packages.parents[1].glob("LICENSE.txt"), *packages.parent.glob("LICENSE.txt")]:
+        shutil.copy(python, out / "python.txt")
     # Qt's wheels name these and do not bring them.
     for name in ("GPL-3", "LGPL-3"):
         shutil.copy(Path("/usr/share/common-licenses", name), out / f"{name}.txt")
@@ -140,9 +143,11 @@ def main() -> None:
     archive: Path | None = arguments.archive
     if archive is None:
         return
-    for name, what in LAUNCHERS.items():
-        (folder / f"{name}.exe").write_bytes(launcher(*what))
-    pack(folder, archive)
+    whole = next((parent for parent in folder.parents if parent.suffix == ".app"), folder)
+    if whole == folder:
+        for name, what in LAUNCHERS.items():
+            (folder / f"{name}.exe").write_bytes(launcher(*what))
+    pack(whole, archive)
     size = archive.stat().st_size
     print(f"{archive}: {size / 1e6:.0f} MB")
     if size > LARGEST:

@@ -1,8 +1,8 @@
 """The bundle for every system: `make test-bundles` builds it and names it in PALETTE4D_BUNDLE.
 
 Without that variable no test is collected here, and without PALETTE4D_WHEELS (`make test-wheels`)
-none of the wheels and of the folder for Linux. What is missing on this machine is an error that
-says what to install; no test skips.
+none of the wheels, of the folder for Linux and of the app for macOS. What is missing on this
+machine is an error that says what to install; no test skips.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from bundles.systems import System, needed, wine_path
 GIVEN = os.environ.get("PALETTE4D_BUNDLE")
 collect_ignore_glob = [] if GIVEN else ["test_*.py"]
 if not os.environ.get("PALETTE4D_WHEELS"):
-    collect_ignore_glob += ["test_wheels.py", "test_linux_folder.py"]
+    collect_ignore_glob += ["test_wheels.py", "test_linux_folder.py", "test_macos_app.py"]
 
 
 @pytest.fixture(scope="session")
