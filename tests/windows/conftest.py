@@ -36,6 +36,7 @@ def wine(program: str, *words: str | Path, cwd: Path) -> subprocess.CompletedPro
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         encoding="utf-8",
+        errors="replace",
         timeout=600,
         check=False,
     )

@@ -118,14 +118,6 @@ def test_errors_say_what_to_do_in_utf8(places: tuple[Path, Path], windows: Run) 
     assert (done.returncode, "色.p4d.json" in done.stdout) == (1, True), done.stdout
 
 
-def test_files_locks_and_jobs(windows_pytest: Run, repo_root: Path, tmp_path: Path) -> None:
-    for name in ("wine.py", "common/conftest.py", "common/test_windows.py"):
-        shutil.copy(repo_root / "tests" / name, tmp_path)
-    done = windows_pytest("-q", "--rootdir", ".", "test_windows.py", cwd=tmp_path)
-    assert done.returncode == 0, done.stdout
-    assert " passed" in done.stdout
-
-
 def test_many_processes_bake_a_series(places: tuple[Path, Path], windows: Run) -> None:
     words = ("export", "clip.p4d.json", "-o", "luts", "--every", "4", "--jobs", "2")
     done = windows(*words, cwd=places[1])
