@@ -27,6 +27,8 @@ def wine(program: str, *words: str | Path, cwd: Path) -> subprocess.CompletedPro
         "WINEDEBUG": "-all",
         "WINEDLLOVERRIDES": "mscoree,mshtml=",
         "LC_ALL": "C.UTF-8",  # file names in UTF-8
+        # Qt without a screen looks nowhere else. Wine keeps QT_… of Linux to itself.
+        "WINEQT_QPA_FONTDIR": r"C:\windows\Fonts",
     }
     return subprocess.run(
         ["wine", FOLDER / program, *words],
