@@ -49,7 +49,9 @@ def import_library(version: str, folder: Path, archive: Path) -> None:
     (folder / dll).write_bytes(content)
     parsed = lief.PE.parse(content)
     assert parsed is not None
-    names = sorted(str(entry.name) for entry in parsed.get_export().entries)
+    exported = parsed.get_export()
+    assert exported is not None
+    names = sorted(str(entry.name) for entry in exported.entries)
     definition = folder / "python.def"
     definition.write_text(f"LIBRARY {dll}\nEXPORTS\n" + "".join(f"    {name}\n" for name in names))
     words = ["dlltool", "-m", "i386:x86-64", "-D", dll, "-d", str(definition)]

@@ -30,9 +30,8 @@ def by_ffmpeg(path: Path, colours: F32, interpolation: str) -> F32:
     source = graph.add_buffer(
         width=width, height=height, format="gbrpf32le", time_base=Fraction(1, 24)
     )
-    # Inside a filter's arguments, ' : \ need quotes; pytest's folders have but a drive's colon.
-    named = path.as_posix().replace(":", "\\:")
-    filter_ = graph.add("lut3d", f"file='{named}':interp={interpolation}")
+    # Quotes keep the colon of a drive; pytest's folders have no ' of their own.
+    filter_ = graph.add("lut3d", f"file='{path.as_posix()}':interp={interpolation}")
     sink = graph.add("buffersink")
     source.link_to(filter_)
     filter_.link_to(sink)
