@@ -17,6 +17,10 @@ class NoAnswer:
         return int, ("no number",)
 
 
+#: Windows ends a process that gets any signal.
+KILL = getattr(signal, "SIGKILL", signal.SIGTERM)
+
+
 def lie(value: int, threads: int) -> object:
     """Square a number, but answer 2 with what cannot be received, and 3 with nothing."""
     return NoAnswer() if value == 2 else None if value == 3 else value * value
@@ -29,7 +33,7 @@ def piece(value: int, threads: int) -> tuple[int, int]:
     if value == 4:
         raise ZeroDivisionError
     if value == 5:
-        os.kill(os.getpid(), signal.SIGKILL)
+        os.kill(os.getpid(), KILL)
     if value == 7:
         return piece(7, threads)
     return value * value, threads
@@ -41,7 +45,7 @@ def once(marker: str, threads: int) -> str:
         Path(marker).touch(exist_ok=False)
     except FileExistsError:
         return "done"
-    os.kill(os.getpid(), signal.SIGKILL)
+    os.kill(os.getpid(), KILL)
     raise AssertionError
 
 

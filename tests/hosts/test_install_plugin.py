@@ -75,7 +75,7 @@ def test_the_bundle_knows_which_python_has_palette4d(
         target = install_bundle(bundle, tmp_path / "OFX", link=link)
     finally:
         os.umask(old)
-    assert (target / PROGRAM).read_text() == f"{sys.executable}\n"
+    assert (target / PROGRAM).read_text("utf-8") == f"{sys.executable}\n"
     # The node believes no file that everybody may change; Windows has access lists for that.
     assert os.name == "nt" or stat.S_IMODE((target / PROGRAM).stat().st_mode) == 0o644
 

@@ -11,11 +11,20 @@ import pytest
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 # The page for releases says what is known of the others.
-ROOMS = ("bindings", "colour", "common", "hosts", "lut_export", "plotting")
+ROOMS = (
+    "bindings",
+    "colour",
+    "common",
+    "hosts",
+    "jobs/test_pool.py",
+    "lut_export",
+    "parity",
+    "plotting",
+)
 
 
 @pytest.mark.parametrize("room", ROOMS)
-def test_room(room: str, windows_pytest: Run, repo_root: Path, tmp_path: Path) -> None:
-    options = ("-q", "-p", "no:cacheprovider", "-m", "not slow", "--basetemp", f"Z:{tmp_path}/of")
+def test_room(room: str, windows_pytest: Run, repo_root: Path) -> None:
+    options = ("-q", "-p", "no:cacheprovider", "-m", "not slow")
     done = windows_pytest(*options, f"tests/{room}", cwd=repo_root)
     assert done.returncode == 0, done.stdout
