@@ -241,7 +241,8 @@ def _stream(movie: Any, size: tuple[int, int], rate: Fraction, how: Delivery) ->
     for name, text in own.items():
         if text:
             stream.metadata[name] = text
-    stream.thread_type = "AUTO"
+    # Threads that share a frame keep one in memory; those of x264 would code it worse.
+    stream.thread_type = "SLICE" if how.codec.encoder == "prores_ks" else "AUTO"
     return stream
 
 
@@ -321,15 +322,16 @@ def _picture(pixels: F32, premultiplied: bool, how: Delivery) -> av.VideoFrame:
         for k, samples in enumerate(_planes(part, how)):
             top = rows.start * len(lines[k]) // picture.height
             lines[k][top : top + len(samples), : samples.shape[1]] = samples
-    for target, stored in zip(picture.planes, lines, strict=True):
-        target.update(stored.tobytes())
     return picture
 
 
 def _lines(plane: Any) -> NDArray[Any]:
-    """Return empty lines for a plane's samples, as long as those in memory."""
+    """Return the lines of a plane's samples, as long as they are in its memory, and empty."""
     kind = np.dtype("<u2" if plane.line_size >= 2 * plane.width else "u1")
-    return np.zeros((plane.height, plane.line_size // kind.itemsize), kind)
+    length = plane.line_size // kind.itemsize
+    lines = np.frombuffer(plane, kind)[: plane.height * length].reshape(plane.height, length)
+    lines[:] = 0
+    return lines
 
 
 def _planes(pixels: F32, how: Delivery) -> Iterator[NDArray[np.floating[Any]]]:
