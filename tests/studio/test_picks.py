@@ -18,7 +18,7 @@ pytest.importorskip("PySide6", reason="the extra palette4d[studio] is not instal
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 from windows import Settle, send
 
 import palette4d
@@ -298,6 +298,27 @@ def test_the_answers_buttons_do_what_it_proposes(qtbot: Any, opened: Window, sid
     answered(panel, Answer(6, 0.2, (replace(green, gesture=""),)))  # no hold helps
     assert other.isVisibleTo(panel)
     assert not other.button.isVisibleTo(panel)
+
+
+@pytest.mark.parametrize("by_key", [False, True])
+def test_what_was_proposed_and_done_leaves_the_keyboard_on_no_button(
+    qtbot: Any, opened: Window, by_key: bool
+) -> None:
+    """The next Space plays: it removed the pick, as the button that had the keyboard was gone."""
+    pick(qtbot, opened, 40, 30)
+    panel, session = opened.inspector.panel, opened.session
+    held = Note("green", Place(6, (120, 70), 5, (0.2, 0.6, 0.3)), gesture="hold")
+    answered(panel, Answer(6, 0.2, (held,)))
+    button = panel.notes[0].button
+    if by_key:
+        button.setFocus()
+        QTest.keyClick(button, Qt.Key.Key_Space)
+    else:
+        qtbot.mouseClick(button, LEFT)
+    qtbot.waitUntil(lambda: not session.following, timeout=20_000)
+    answered(panel, Answer(6, 0.2))
+    assert not button.isVisibleTo(panel)
+    assert not isinstance(opened.focusWidget(), QAbstractButton)
 
 
 def test_a_pick_that_floods_is_a_warning(qtbot: Any, opened: Window) -> None:

@@ -189,6 +189,7 @@ class Banner(QFrame):
         row.addWidget(label, 1)
         for name, call in entry.remedies.items():
             button = QPushButton(name)
+            button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # it goes, and the keyboard stays
             button.clicked.connect(call)
             row.addWidget(button)
         close = QToolButton()

@@ -66,6 +66,7 @@ class Line(QWidget):
         row.addWidget(self.swatch)
         row.addWidget(self.words, 1)
         self.button = QPushButton()
+        self.button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.button.hide()
         row.addWidget(self.button)
         self.hide()
@@ -243,6 +244,8 @@ class PickPanel(QWidget):
         if found is None:
             return
         note = found.notes[k]
+        # The button goes when that is done, and the keyboard would go to the next one: *Remove*.
+        self.notes[k].button.clearFocus()
         if note.window is not None:
             grade_steps.set_window(self.session, note.id, found.frame, note.window)
         if note.place is None:
