@@ -56,6 +56,15 @@ def test_an_edit_leaves_the_bytes_of_the_verb(
     assert sidecar.read_bytes() == twin.read_bytes()
 
 
+@pytest.mark.parametrize(("shown", "then"), [("before", "after"), ("wipe", "wipe")])
+def test_what_is_opened_next_is_seen_as_it_is_graded(
+    session: Session, sidecar: Path, tmp_path: Path, shown: str, then: str
+) -> None:
+    session.look(compare=shown)
+    session.open_sidecar(shutil.copy(sidecar, tmp_path / "b.p4d.json"))
+    assert session.view.compare == then
+
+
 def test_a_palette_of_very_many_frames_takes_little_memory(tmp_path: Path) -> None:
     """Its frames are counted, not listed: there are 10^9."""
     grey_levels(tmp_path, range(3, 6))

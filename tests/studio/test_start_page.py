@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QPushButton
 
 from palette4d.studio import texts
+from palette4d.studio.shot_list import THUMB, icon_of
 from palette4d.studio.window import Window
 
 
@@ -22,7 +24,7 @@ def test_recent_files_have_pictures_and_open(
     page.fill()
     assert page.isVisible()
     (item,) = (page.list.item(row) for row in range(page.list.count()))
-    assert item.text() == sidecar.name
+    assert item.text() == f"{sidecar.parent.name}/{sidecar.name}"  # many files have one name
 
     def coloured() -> bool:
         image = item.icon().pixmap(QSize(112, 63)).toImage()
@@ -32,6 +34,13 @@ def test_recent_files_have_pictures_and_open(
     page.list.itemActivated.emit(item)
     assert window.session.path == sidecar
     assert not page.isVisible()
+
+
+def test_pictures_of_all_shapes_have_one_size(qapp: Any) -> None:
+    """What a smaller one does not cover of the blank one before it stayed on the screen."""
+    for height, width in ((20, 60), (63, 30), (1, 1)):
+        icon = icon_of(np.full((height, width, 4), 255, np.uint8))
+        assert icon.availableSizes() == [THUMB]
 
 
 @pytest.mark.parametrize(

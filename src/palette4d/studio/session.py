@@ -214,7 +214,10 @@ class Session(Drafts):
         self.clip = self.player = self._stamp = self.probe = self.hover = self.place = None
         self.selection, self.playing, self.marks = (), 0, None
         self.tool, self.answer = "", None
-        self._edited_at, self.view = None, dataclasses.replace(self.view, version="", after="")
+        # What is opened next is seen as it is graded.
+        compare = "after" if self.view.compare == "before" else self.view.compare
+        self._edited_at = None
+        self.view = dataclasses.replace(self.view, version="", after="", compare=compare)
 
     # -------------------------------------------------------------------------------------- edits
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QIcon, QPixmap
+from PySide6.QtGui import QIcon, QPainter, QPixmap
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QVBoxLayout, QWidget
 
 from palette4d.common.errors import Palette4dError
@@ -142,8 +142,17 @@ class Shots(QWidget):
 
 
 def icon_of(pixels: U8) -> QIcon:
-    """Return pixels, (h, w, 4) uint8, as an icon."""
-    return QIcon(QPixmap.fromImage(image_of(pixels)))
+    """Return pixels, (h, w, 4) uint8, in the middle of an icon.
+
+    All icons have one size: of a larger one before it, Qt leaves what a smaller one does not cover.
+    """
+    picture, canvas = image_of(pixels), QPixmap(THUMB)
+    canvas.fill(Qt.GlobalColor.black)
+    painter = QPainter(canvas)
+    free = THUMB - picture.size()
+    painter.drawImage(free.width() // 2, free.height() // 2, picture)
+    painter.end()
+    return QIcon(canvas)
 
 
 def thumbnail(sidecar: Path) -> U8 | None:

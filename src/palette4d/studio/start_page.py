@@ -105,7 +105,8 @@ class StartPage(QWidget):
         blank = QPixmap(THUMB)
         blank.fill(Qt.GlobalColor.black)
         for path in paths:
-            item = QListWidgetItem(QIcon(blank), Path(path).name)
+            found = Path(path)
+            item = QListWidgetItem(QIcon(blank), str(Path(found.parent.name, found.name)))
             item.setData(Qt.ItemDataRole.UserRole, path)
             item.setToolTip(theme.plain(path))
             self.list.addItem(item)
