@@ -118,6 +118,12 @@ def test_picks_and_holds_are_marks_before_and_after(opened: Window, settle: Sett
     assert marks["p2"].hold
     grade_steps.enable(session, "p1", False)
     assert [mark.id for mark in scopes.marks()] == ["p2"]
+    # Of the version that is shown.
+    opened.session.edit(lambda document: document.save_version("A"))
+    opened.session.edit(lambda document: document.unpick("p2"))
+    assert scopes.marks() == []
+    opened.session.look(after="A")
+    assert [mark.id for mark in scopes.marks()] == ["p2"]
 
 
 def test_the_chosen_scopes_are_remembered(opened: Window, settle: Settle) -> None:

@@ -239,11 +239,19 @@ class Scopes(QWidget):
     # ------------------------------------------------------------------------------- the picks
 
     def marks(self) -> list[Mark]:
-        """Return the picks and holds that are switched on, as the display shows their colours."""
+        """Return the picks and holds that are switched on, as the display shows their colours.
+
+        Those of the version that "after" shows.
+        """
         session = self.session
         document, display = session.document, session.display
-        picks = [] if document is None else [p for p in document.grade.picks if p.enabled]
-        if document is None or display is None or not picks:
+        if document is None or display is None:
+            return []
+        grade, version = document.grade, session.view.after
+        if version in grade.versions:
+            grade = grade.version(version)
+        picks = [p for p in grade.picks if p.enabled]
+        if not picks:
             return []
         rgb = np.array([(p.rgb, p.rgb if p.to is None else p.to) for p in picks], np.float64)
         conversion = document.grade.core.conversion
