@@ -1,8 +1,13 @@
 """The clean-up of picks against a plain filter, written anew from its description."""
 
+import json
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from parity.cases import DOCUMENTS
+from parity.implementations import Core
+from parity.kernel import draw
 
 from palette4d import _core
 
@@ -168,3 +173,21 @@ def test_colours_that_are_none_take_no_part() -> None:
     drawn = _core.draw(image, "recoloured", recolourer())
     np.testing.assert_array_equal(drawn[~good], image[~good])
     np.testing.assert_allclose(drawn[good], expected[good], atol=3e-6)
+
+
+@pytest.mark.parametrize(("lines", "cell"), [(1080, 4), (360, 4), (288, 2), (90, 2)])
+def test_cells_are_half_as_large_in_small_clips(lines: int, cell: int) -> None:
+    """Beyond what the filter sees of a picked colour nothing changes, within it something does."""
+    document = json.loads(json.dumps(DOCUMENTS["still-pick"]))
+    document["clip"]["size"] = [16 * lines // 9, lines]
+    sidecar = Core.sidecar(document)
+    cut, picks = _core.slice_at(sidecar.polytope, 7.0), sidecar.picks_at(7.0)
+    edit = _core.Recolourer(cut.rgb, cut.rgb, cut.faces, picks=picks)
+    image = np.full((48, 160, 3), (0.1, 0.3, 0.8), np.float32)
+    image[:, 80:] += np.random.default_rng(1).normal(0, 0.05, (48, 80, 1)).astype(np.float32)
+    assert (_core.draw(image, "recoloured", edit, clean_up=0) == image).all()
+    image[:, :80] = picks.picks[0][0]
+    support = 6 * cell
+    for drawn in (_core.draw(image, "recoloured", edit), draw(image, edit, clean_up=1.0)):
+        moved = np.flatnonzero((drawn != image).any(axis=(0, 2)))
+        assert support // 2 < moved.max() - 79 <= support
