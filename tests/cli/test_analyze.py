@@ -211,7 +211,7 @@ def test_wrong_usage(clip, tmp_path, capsys):
     assert not Path(out).exists()
 
 
-@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends a program no such signal")
 def test_ctrl_c_leaves_nothing(clip, tmp_path):
     out = tmp_path / "shot.p4d.json"
     for i in range(6, 2000):  # long enough to be interrupted

@@ -373,7 +373,7 @@ class TestAgain:
             tmp_path / "2/rushes.shots.json"
         ).read_bytes()
 
-    @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+    @pytest.mark.skipif(os.name == "nt", reason="Windows sends a program no such signal")
     def test_ctrl_c_leaves_whole_files_and_a_manifest(self, tmp_path: Path) -> None:
         made = timeline()
         for i in range(30):

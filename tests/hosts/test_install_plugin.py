@@ -14,7 +14,7 @@ from pathlib import Path
 
 import access_lists
 import pytest
-from posix_files import links, modes
+from posix_files import gifts, links, modes
 
 from palette4d import _core
 from palette4d.cli import install_plugin
@@ -97,7 +97,7 @@ def test_a_closed_umask_makes_no_closed_plugin(bundle: Path, tmp_path: Path) -> 
         assert {stat.S_IMODE(path.stat().st_mode) for path in folders} == {0o755}
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs root")
+@gifts
 @pytest.mark.parametrize("how", ["theirs", "open", *(["list"] if sys.platform == "linux" else [])])
 @pytest.mark.parametrize("what", ["package", "library", "link"])
 def test_root_installs_nothing_that_another_user_could_change(
@@ -121,7 +121,7 @@ def test_root_installs_nothing_that_another_user_could_change(
     assert not (tmp_path / "OFX").exists()
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs root")
+@gifts
 def test_root_installs_no_sources_of_another_user(
     bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

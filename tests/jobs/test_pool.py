@@ -62,7 +62,7 @@ def test_processes_that_end_while_others_start() -> None:
     assert len(found) == 8
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends a program no such signal")
 def test_a_parent_that_is_killed_leaves_no_process(tmp_path: Path) -> None:
     program = tmp_path / "program.py"
     program.write_text(

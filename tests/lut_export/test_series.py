@@ -215,7 +215,7 @@ if __name__ == "__main__":
             start_new_session=True,
         )
 
-    @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+    @pytest.mark.skipif(os.name == "nt", reason="Windows sends a program no such signal")
     @pytest.mark.parametrize("jobs", [pytest.param("1", marks=pytest.mark.slow), "2"])
     def test_ctrl_c_leaves_whole_files_and_an_index(self, jobs: str, tmp_path: Path) -> None:
         folder = tmp_path / "l"
