@@ -140,6 +140,19 @@ def test_shades_of_one_thing_are_no_others(monkeypatch: pytest.MonkeyPatch, kind
     assert answer(document_of(monkeypatch, picture)).notes == ()
 
 
+@pytest.mark.parametrize(("columns", "told"), [(0, True), (130, False)])
+def test_a_pick_that_fills_the_frame_with_unlike_colours_is_told(
+    monkeypatch: pytest.MonkeyPatch, columns: int, told: bool
+) -> None:
+    """Haze that goes from red to a pale red without an edge, beside grey columns."""
+    part = np.clip((np.arange(W) - columns) / (W - columns), 0, 1)[:, None]
+    picture = np.tile((1 - part) * RED + part * np.array([0.6, 0.3, 0.3]), (H, 1, 1))
+    picture[:, :columns] = GREY
+    found = answer(document_of(monkeypatch, picture), ((W + columns) / 2, 60.0))
+    line = note(found, "takes what looks like one thing, out to the frame's edges")
+    assert (line is not None and line.warns) == told
+
+
 @pytest.mark.parametrize(("columns", "proposed"), [(2, True), (10, False)])
 def test_a_proposed_hold_costs_the_thing_little(
     monkeypatch: pytest.MonkeyPatch, columns: int, proposed: bool
@@ -330,7 +343,7 @@ def test_a_proposed_window_leaves_the_same_colour_elsewhere(
     document = document_of(monkeypatch, picture)
     found = answer(document)
     assert note(found, "its colour elsewhere") is not None
-    proposed = note(found, "a window around the thing")
+    proposed = note(found, "if that is not part of it, a window around the thing")
     assert proposed is not None
     assert (proposed.gesture, proposed.id) == ("window", "p1")
     assert proposed.window is not None

@@ -39,6 +39,9 @@ OTHERS = 0.005
 COST = 0.1
 #: A pick that takes more than this share of the pixels of another pick is reported.
 SHARED = 0.2
+#: A thing of more than FLOOD of the frame that reaches three of its edges, and has more than FAR of
+#: its pixels in colours unlike the marked ones, is reported: it is seldom what was meant.
+FLOOD, FAR = 0.4, 0.3
 #: A taken colour farther than this from the line of the picked hue, in pick space, has another hue:
 #: faces beside red clothes have 0.08 to 0.12. A picked colour with less chroma than GREY has none.
 HUE, GREY = 0.08, 0.1
@@ -404,6 +407,8 @@ def _also(it: _Thing) -> Iterator[Note]:
         ("also takes what touches it and looks otherwise", beside),
         ("also takes its colour elsewhere", elsewhere),
     ]
+    if not beside.any():
+        yield from _flood(it, change)
     unparted = False
     for words, others in sorted(kinds, key=lambda kind: -change[kind[1]].sum()):
         if (share := float(change[others].sum() / change.size)) <= OTHERS:
@@ -431,6 +436,19 @@ def _also(it: _Thing) -> Iterator[Note]:
         yield from _apart(it, change)
 
 
+def _flood(it: _Thing, change: F32) -> Iterator[Note]:
+    """Report a thing that fills the frame with colours unlike the marked ones."""
+    own, view = it.own, it.view
+    edges = sum(edge.any() for edge in (own[0], own[-1], own[:, 0], own[:, -1]))
+    much = change[own].sum() > FLOOD * change.size and edges >= 3
+    if it.pick.window is None and it.marks and much:
+        points = view.points(view.rgb) * (1, 1, thing.LIGHTNESS)
+        away = [np.linalg.norm(points[own] - points[m].mean(axis=0), axis=1) for m in it.marks]
+        if (np.min(away, axis=0) > SAME_COLOUR).mean() > FAR:
+            words = "takes what looks like one thing, out to the frame's edges; if yours is smaller"
+            yield Note(f"{words}, give it a window", id=it.pick.id, warns=True)
+
+
 def _apart(it: _Thing, change: F32) -> Iterator[Note]:
     """Propose a window around a pick's thing, if that leaves out the rest and costs it little."""
     from scipy import ndimage
@@ -440,5 +458,6 @@ def _apart(it: _Thing, change: F32) -> Iterator[Note]:
     after = it.view.within(it.pick, box)
     rest = _lost(change, after, ~thing_itself)
     if rest > 0.5 and (change - after).mean() > OTHERS and _lost(change, after, it.own) <= COST:
-        note = Note("a window around the thing leaves the rest out", id=it.pick.id, window=box)
+        words = "if that is not part of it, a window around the thing leaves it out"
+        note = Note(words, id=it.pick.id, window=box)
         yield note.proposing("window", after)
