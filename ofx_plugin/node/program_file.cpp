@@ -5,8 +5,12 @@
 #include <cctype>
 #include <cerrno>
 #include <cstring>
+#include <optional>
+#include <sstream>
+#include <vector>
 
 #include "paths.hpp"
+#include "sidecar/file_bytes.hpp"
 
 #if !defined(_WIN32)
 #include <fcntl.h>
@@ -85,14 +89,15 @@ std::string text_of(const fs::path& file, std::string& problem) {
 }
 
 #if !defined(_WIN32)
-/// Whether a group is the user's own, as some systems give one of the user's name to each.
+/// Whether a group is the user's own, as some systems give one of the user's name to each, and has
+/// no other members.
 bool of_me_alone(gid_t group) {
     struct passwd user{}, *me = nullptr;
     struct group about{}, *found = nullptr;
     std::array<char, 16384> of_user{}, of_group{};
     return ::getpwuid_r(::geteuid(), &user, of_user.data(), of_user.size(), &me) == 0 && me &&
            ::getgrgid_r(group, &about, of_group.data(), of_group.size(), &found) == 0 && found &&
-           std::strcmp(user.pw_name, about.gr_name) == 0;
+           std::strcmp(user.pw_name, about.gr_name) == 0 && !about.gr_mem[0];
 }
 
 /// Whether a file has an access list: the group's bits are then those of all whom it names.
@@ -119,14 +124,50 @@ std::string changeable(const fs::path& path) {
     return "";
 }
 
-/// The same for a program, where its links lead, and all folders on the way.
+/// The same for a program, each link on the way and where it leads, and all folders above these.
 std::string changeable_program(const fs::path& program) {
-    std::error_code error;
-    for (fs::path path : {program, fs::canonical(program, error)}) {
-        for (; path.has_relative_path(); path = path.parent_path()) {
-            const std::string problem = changeable(path);
-            if (!problem.empty()) return problem;
+    constexpr int kMostLinks = 40;  // as on Linux
+    fs::path done = program.root_path();
+    std::vector<fs::path> ahead;  // the next one last
+    const auto add = [&ahead](const fs::path& path) {
+        const fs::path names = path.relative_path();
+        const std::vector<fs::path> parts(names.begin(), names.end());
+        ahead.insert(ahead.end(), parts.rbegin(), parts.rend());
+    };
+    add(program);
+    for (int links = 0; !ahead.empty();) {
+        const fs::path name = ahead.back();
+        ahead.pop_back();
+        if (name == "..") done = done.parent_path();
+        if (name == ".." || name == "." || name.empty()) continue;
+        const fs::path place = done / name;
+        const std::string problem = changeable(place);
+        if (!problem.empty()) return problem;
+        std::error_code error;
+        if (!fs::is_symlink(place, error)) {
+            done = place;
+            continue;
         }
+        if (++links > kMostLinks) return program.u8string() + " leads through too many links";
+        const fs::path target = fs::read_symlink(place, error);
+        if (target.is_absolute()) done = target.root_path();
+        add(target);
+    }
+    return "";
+}
+
+/// The same for the Python that made the program's virtual environment, whose library it runs.
+std::string changeable_base(const fs::path& program) {
+    const std::optional<std::string> settings =
+        bytes_of(program.parent_path().parent_path() / "pyvenv.cfg", kMaxProgramBytes);
+    std::istringstream lines(settings.value_or(""));
+    for (std::string line; std::getline(lines, line);) {
+        const std::size_t sign = line.find('=');
+        if (line.substr(0, line.find_first_of(" =")) != "home" || sign == std::string::npos)
+            continue;
+        const std::size_t from = line.find_first_not_of(' ', sign + 1);
+        const fs::path home = from == std::string::npos ? "" : line.substr(from);
+        if (home.is_absolute()) return changeable_program(home);
     }
     return "";
 }
@@ -171,7 +212,8 @@ ProgramPath read_program(const fs::path& file) {
     }
 #if !defined(_WIN32)
     if (found.problem.empty()) {
-        const std::string problem = changeable_program(found.path);
+        std::string problem = changeable_program(found.path);
+        if (problem.empty()) problem = changeable_base(found.path);
         if (!problem.empty()) {
             found.problem = "it names " + found.path + ", and " + problem +
                             "; expected a palette4d that you or root alone may change";

@@ -3,6 +3,7 @@
 import errno
 import os
 import secrets
+import shutil
 import stat
 import struct
 import subprocess
@@ -553,6 +554,26 @@ def test_a_new_folder_that_another_process_removes_is_made_again(
     with files.temporary_folder(tmp_path) as folder:
         assert folder.is_dir()
     assert removed
+    assert names(tmp_path) == []
+
+
+@gifts
+def test_a_temporary_folder_gives_its_files_the_folders_group(tmp_path: Path) -> None:
+    """Of a team's folder, with the set-group bit; what a kill leaves over is found as well."""
+    os.chown(tmp_path, -1, 12345)
+    tmp_path.chmod(0o2775)
+    with files.temporary_folder(tmp_path) as folder:
+        made = folder / "out" / "a.png"
+        made.parent.mkdir()
+        made.touch()
+        assert (made.stat().st_gid, made.parent.stat().st_gid) == (12345, 12345)
+        assert folder.stat().st_mode & 0o777 == 0o700
+        copy = folder.with_name(f".palette4d.{'0' * 16}.p4d-tmp")
+        shutil.copytree(folder, copy)
+        copy.chmod(folder.stat().st_mode)
+    files._swept.clear()
+    with files.temporary_folder(tmp_path):
+        pass
     assert names(tmp_path) == []
 
 

@@ -132,7 +132,33 @@ TEST(the_programs_file_is_believed_only_if_it_is_ours) {
             }
         }
     }
-    if (::geteuid() == 0) {  // a group of the user's own name is the user; another is not
+    if (::geteuid() == 0) {
+        // A link that leads through a folder of theirs, to a program of ours.
+        const fs::path theirs = folder() / "theirs";
+        fs::create_directory(theirs);
+        fs::create_symlink(place / "sh", theirs / "sh");
+        write("program", (folder() / "through").u8string());
+        for (const fs::path& to : {theirs / "sh", fs::path("theirs/../theirs/sh")}) {
+            fs::create_symlink(to, folder() / "through");
+            CHECK(read_program(file).problem.empty());
+            CHECK(::chown(theirs.c_str(), 12345, 12345) == 0);
+            refused("theirs belongs to another user");
+            CHECK(::chown(theirs.c_str(), 0, 0) == 0);
+            fs::remove(folder() / "through");
+        }
+        // A virtual environment that a Python of theirs made.
+        const fs::path made = folder() / "venv";
+        fs::create_directories(made / "bin");
+        fs::copy_file(place / "sh", made / "bin" / "python");
+        write("venv/pyvenv.cfg",
+              "include-system-site-packages = false\nhome = " + theirs.u8string());
+        write("program", (made / "bin" / "python").u8string());
+        CHECK(read_program(file).problem.empty());
+        CHECK(::chown(theirs.c_str(), 12345, 12345) == 0);
+        refused("theirs belongs to another user");
+        fs::remove_all(made);
+        fs::remove_all(theirs);
+        // A group of the user's own name is the user; another is not.
         std::string open = "/tmp/palette4d-XXXXXX";  // where both users may read
         CHECK(::mkdtemp(open.data()) != nullptr);
         fs::copy_file(place / "sh", fs::path(open) / "sh");

@@ -10,6 +10,7 @@ import shutil
 import stat
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
 
 import access_lists
@@ -131,6 +132,39 @@ def test_root_installs_no_sources_of_another_user(
     monkeypatch.setattr(bundles, "__file__", str(sources))
     os.chown(sources, 12345, 12345)
     with pytest.raises(Palette4dError, match=r"sources .*belongs to another user"):
+        install_bundle(bundle, tmp_path / "OFX")
+
+
+@gifts
+@pytest.mark.parametrize("relative", [False, True])
+def test_root_installs_nothing_that_a_link_of_another_user_leads_to(
+    bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, relative: bool
+) -> None:
+    """Where the links lead is root's; the one on the way may lead elsewhere tomorrow."""
+    theirs = tmp_path / "theirs"
+    theirs.mkdir()
+    (theirs / "python").symlink_to(sys.executable)
+    (tmp_path / "python").symlink_to("theirs/../theirs/python" if relative else theirs / "python")
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    install_bundle(bundle, tmp_path / "OFX")
+    os.chown(theirs, 12345, 12345)
+    with pytest.raises(Palette4dError, match=r"theirs belongs to another user"):
+        install_bundle(bundle, tmp_path / "OFX")
+
+
+@gifts
+@pytest.mark.parametrize("what", ["base_prefix", "stdlib"])
+def test_root_installs_no_environment_of_another_users_python(
+    bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    theirs = tmp_path / "theirs"
+    theirs.mkdir()
+    os.chown(theirs, 12345, 12345)
+    if what == "base_prefix":
+        monkeypatch.setattr(sys, what, str(theirs))
+    else:
+        monkeypatch.setattr(sysconfig, "get_path", lambda _: str(theirs))
+    with pytest.raises(Palette4dError, match=r"theirs belongs to another user"):
         install_bundle(bundle, tmp_path / "OFX")
 
 

@@ -251,7 +251,8 @@ def temporary_folder(parent: Path) -> Generator[Path]:
             break
         if _is_locked(lock):
             with contextlib.suppress(OSError):  # a file system without modes
-                os.fchmod(lock, _TEMPORARY_FOLDER)
+                kept = os.fstat(lock).st_mode & stat.S_ISGID  # what is made in it has its group
+                os.fchmod(lock, _TEMPORARY_FOLDER | kept)
             break
         os.close(lock)
         _remove_folder(folder)
@@ -406,7 +407,7 @@ def _remove_left_over(entry: os.DirEntry[str]) -> None:
             if stat.S_ISREG(about.st_mode):
                 Path(entry).unlink()
             elif stat.S_ISDIR(about.st_mode):
-                if stat.S_IMODE(about.st_mode) == _TEMPORARY_FOLDER:
+                if stat.S_IMODE(about.st_mode) & ~stat.S_ISGID == _TEMPORARY_FOLDER:
                     _empty(handle)
                 Path(entry).rmdir()
         finally:

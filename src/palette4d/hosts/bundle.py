@@ -12,6 +12,7 @@ import os
 import platform
 import shutil
 import sys
+import sysconfig
 from pathlib import Path
 
 from palette4d import _core
@@ -144,8 +145,11 @@ def _reason(error: OSError) -> str:
 
 def _refuse_others_program(bundle: Path) -> None:
     """Check that root alone may change what all users' nodes will run."""
-    # This file: an editable installation runs its sources, which lie elsewhere.
-    for path in (Path(sys.executable), Path(sys.prefix), Path(__file__), bundle):
+    # This file: an editable installation runs its sources, which lie elsewhere. The library: a
+    # virtual environment runs that of the Python that made it.
+    libraries = (sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib"))
+    places = (sys.executable, sys.prefix, sys.base_prefix, *libraries, __file__, bundle)
+    for path in map(Path, places):
         problem = changeable(path)
         if problem is not None:
             raise Palette4dError(

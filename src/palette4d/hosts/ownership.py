@@ -10,12 +10,15 @@ from pathlib import Path
 
 from palette4d.common.files import ACCESS_LIST
 
+#: Links on the way of a path, as on Linux.
+MOST_LINKS = 40
+
 
 def changeable(path: Path, owner: int = 0) -> str | None:
     """Return what is wrong with a path that others than root and `owner` could change, or None.
 
-    Looked at are the path, where its links lead, and all folders on the way. The node does the same
-    before it starts a program (`node/program_file.cpp`).
+    Looked at are the path, each link on the way and where it leads, and all folders above these.
+    The node does the same before it starts a program (`node/program_file.cpp`).
 
     Parameters
     ----------
@@ -23,19 +26,39 @@ def changeable(path: Path, owner: int = 0) -> str | None:
     owner : int
         The user who may change it besides root.
     """
-    for way in (path, path.resolve()):
-        for place in (way, *way.parents):
-            about = place.lstat()
-            if about.st_uid not in (0, owner):
-                return f"{place} belongs to another user than root"
-            if stat.S_ISLNK(about.st_mode):
-                continue
-            sticky = stat.S_ISDIR(about.st_mode) and about.st_mode & stat.S_ISVTX
-            for_all = about.st_mode & stat.S_IWOTH
-            # With an access list the group's bits are those of all whom it names.
-            for_group = about.st_mode & stat.S_IWGRP and (about.st_gid != 0 or _has_list(place))
-            if (for_all or for_group) and not sticky:
-                return f"{place} may be changed by other users than root"
+    done, ahead, links = Path(path.anchor), list(reversed(path.parts[1:])), 0
+    problem = _changeable_itself(done, owner)
+    while ahead and problem is None:
+        name = ahead.pop()
+        if name == "..":
+            done = done.parent
+            continue
+        place = done / name
+        problem = _changeable_itself(place, owner)
+        if place.is_symlink():
+            target, links = place.readlink(), links + 1
+            if links > MOST_LINKS:
+                return f"{path} leads through more than {MOST_LINKS} links"
+            done = Path(target.anchor) if target.is_absolute() else done
+            ahead += reversed(target.parts[1:] if target.is_absolute() else target.parts)
+        else:
+            done = place
+    return problem
+
+
+def _changeable_itself(place: Path, owner: int) -> str | None:
+    """Return what is wrong with a file, a folder or a link, whatever is above it."""
+    about = place.lstat()
+    if about.st_uid not in (0, owner):
+        return f"{place} belongs to another user than root"
+    if stat.S_ISLNK(about.st_mode):
+        return None
+    sticky = stat.S_ISDIR(about.st_mode) and about.st_mode & stat.S_ISVTX
+    for_all = about.st_mode & stat.S_IWOTH
+    # With an access list the group's bits are those of all whom it names.
+    for_group = about.st_mode & stat.S_IWGRP and (about.st_gid != 0 or _has_list(place))
+    if (for_all or for_group) and not sticky:
+        return f"{place} may be changed by other users than root"
     return None
 
 
