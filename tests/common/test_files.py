@@ -1,13 +1,14 @@
 """The atomic writer: whatever happens, a reader finds the old file or the new one."""
 
+import contextlib
 import errno
 import os
 import secrets
 import shutil
 import stat
-import struct
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -15,7 +16,7 @@ from pathlib import Path, PureWindowsPath
 
 import access_lists
 import pytest
-from access_lists import for_one
+from access_lists import NOBODY, for_one
 from posix_files import folders, gifts, links, locks, make_deep, modes, pipes
 
 from palette4d.colour.ocio_config import config_of_sidecar
@@ -156,34 +157,90 @@ def test_an_access_list_that_cannot_be_copied_gives_its_rights_to_nobody(
 @pytest.mark.skipif(
     sys.platform != "linux" or os.geteuid() != 0, reason="needs root, and Linux's attributes"
 )
-def test_who_cannot_give_the_group_keeps_the_attributes_and_narrows_the_list(
-    old: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("given", ["", "group"])
+@pytest.mark.parametrize("listed", [False, True])
+def test_who_cannot_give_the_file_away_names_its_owner_and_group(
+    old: Path, listed: bool, given: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What it gave to the old group and to others by name must not go to the new group."""
+    """They and others by name keep their rights; the new group has no more than all have."""
     os.chown(old, 12345, 12346)
+    old.chmod(0o664)
     os.setxattr(old, "user.reviewed", b"yes")
-    os.setxattr(old, ACL, FOR_ONE)
-    monkeypatch.setattr(os, "fchown", failing(PermissionError(errno.EPERM, "not you")))
+    if listed:
+        os.setxattr(old, ACL, access_lists.for_one(6, 4, user=777))
+    real = os.fchown
+
+    def fchown(handle: int, owner: int, group: int) -> None:
+        if not (given and owner == -1):
+            raise PermissionError(errno.EPERM, "not you")
+        real(handle, owner, group)
+
+    monkeypatch.setattr(os, "fchown", fchown)
     replace(old, lambda: None)
+    assert (old.stat().st_uid, old.stat().st_gid) == (0, 12346 if given else 0)
     assert os.getxattr(old, "user.reviewed") == b"yes"
-    assert os.getxattr(old, ACL) == FOR_ONE.replace(
-        struct.pack("<HH", 16, 4), struct.pack("<HH", 16, 0)
-    )
+    group, others = (0, 0) if listed else (6, 4)
+    expected = [(1, 6, NOBODY), (2, 6, 12345), (16, 6, NOBODY), (32, others, NOBODY)]
+    expected += [(2, 4, 777)] if listed else []
+    expected += [(4, group if given else group & others, NOBODY)]
+    expected += [] if given else [(8, group, 12346)]
+    assert sorted(access_lists.entries(old)) == sorted(expected)
+
+
+@pytest.mark.skipif(
+    sys.platform != "linux" or os.geteuid() != 0, reason="needs root, and Linux's attributes"
+)
+def test_users_that_a_list_names_write_one_file_in_turn() -> None:
+    with tempfile.TemporaryDirectory() as folder:  # pytest's are closed to other users
+        Path(folder).chmod(0o777)
+        file = Path(folder, "shot.p4d.json")
+        file.write_bytes(b"old")
+        os.chown(file, 12345, 12345)
+        os.setxattr(file, ACL, access_lists.for_one(6, 6, user=777))
+        for user in (777, 12345, 777):
+            with as_user(user):
+                replace(file, lambda: None)
+            assert file.stat().st_uid == user
+        with as_user(888), pytest.raises(PermissionError):
+            file.read_bytes()
+
+
+@contextlib.contextmanager
+def as_user(user: int) -> Iterator[None]:
+    groups = os.getgroups()
+    os.setgroups([])
+    os.setegid(user)
+    os.seteuid(user)
+    try:
+        yield
+    finally:
+        os.seteuid(0)
+        os.setegid(0)
+        os.setgroups(groups)
 
 
 @gifts
-@pytest.mark.parametrize(("may", "mode"), [(True, 0o664), (False, 0o644)])
-def test_owner_and_group_are_kept_or_their_rights_go(
-    old: Path, may: bool, mode: int, monkeypatch: pytest.MonkeyPatch
+def test_owner_and_group_are_kept(old: Path) -> None:
+    os.chown(old, 12345, 12346)
+    old.chmod(0o664)
+    replace(old, lambda: None)
+    about = old.stat()
+    assert (about.st_uid, about.st_gid, stat.S_IMODE(about.st_mode)) == (12345, 12346, 0o664)
+    assert sys.platform != "linux" or ACL not in os.listxattr(old)
+
+
+@pytest.mark.skipif(
+    sys.platform != "linux" or os.geteuid() != 0, reason="needs root, and Linux's attributes"
+)
+def test_without_access_lists_the_rights_of_a_group_that_is_not_kept_go(
+    old: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     os.chown(old, 12345, 12346)
     old.chmod(0o664)
-    if not may:
-        monkeypatch.setattr(os, "fchown", failing(PermissionError(errno.EPERM, "not you")))
+    monkeypatch.setattr(os, "fchown", failing(PermissionError(errno.EPERM, "not you")))
+    monkeypatch.setattr(os, "setxattr", failing(OSError(errno.ENOTSUP, "none here")))
     replace(old, lambda: None)
-    about = old.stat()
-    assert (about.st_uid, about.st_gid) == ((12345, 12346) if may else (0, 0))
-    assert stat.S_IMODE(about.st_mode) == mode
+    assert stat.S_IMODE(old.stat().st_mode) == 0o644
 
 
 @modes

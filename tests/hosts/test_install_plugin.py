@@ -10,7 +10,7 @@ import shutil
 import stat
 import subprocess
 import sys
-import sysconfig
+import venv
 from pathlib import Path
 
 import access_lists
@@ -153,17 +153,22 @@ def test_root_installs_nothing_that_a_link_of_another_user_leads_to(
 
 
 @gifts
-@pytest.mark.parametrize("what", ["base_prefix", "stdlib"])
+@pytest.mark.parametrize("what", ["base", "pth"])
 def test_root_installs_no_environment_of_another_users_python(
     bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
+    """Its library lies elsewhere; so do modules that a file *.pth names."""
     theirs = tmp_path / "theirs"
     theirs.mkdir()
-    os.chown(theirs, 12345, 12345)
-    if what == "base_prefix":
-        monkeypatch.setattr(sys, what, str(theirs))
+    venv.create(tmp_path / "venv")
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "venv/bin/python"))
+    if what == "base":
+        monkeypatch.setattr(sys, "base_prefix", str(theirs))
     else:
-        monkeypatch.setattr(sysconfig, "get_path", lambda _: str(theirs))
+        (site,) = (tmp_path / "venv/lib").glob("*/site-packages")
+        (site / "theirs.pth").write_text(f"{theirs}\n", "utf-8")
+    install_bundle(bundle, tmp_path / "OFX")
+    os.chown(theirs, 12345, 12345)
     with pytest.raises(Palette4dError, match=r"theirs belongs to another user"):
         install_bundle(bundle, tmp_path / "OFX")
 

@@ -12,7 +12,8 @@ from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager
 from pathlib import Path
 
-from palette4d.common import locking
+from palette4d.common import access_list, locking
+from palette4d.common.access_list import ACCESS_LIST
 from palette4d.common.errors import Arg, Palette4dError, WriteError
 from palette4d.common.locking import remove_left_over
 
@@ -30,8 +31,6 @@ _LEFT_OVER_AFTER = 86400.0
 #: may rename, but not this mode. The sticky bit on a closed folder does nothing else.
 _TEMPORARY_FOLDER = 0o1700
 _swept: set[Path] = set()
-#: The extended attribute of Linux that holds an access list.
-ACCESS_LIST = "system.posix_acl_access"
 #: As many links on the way to a file as Linux follows.
 _MOST_LINKS = 40
 
@@ -330,11 +329,23 @@ def _copy_permissions(path: Path, handle: int) -> None:
     for owner, group in ((old.st_uid, -1), (-1, old.st_gid)):
         with contextlib.suppress(OSError):
             os.fchown(handle, owner, group)
-    mode = old.st_mode & 0o777
+    mode, new = old.st_mode & 0o777, os.fstat(handle)
+    kept = new.st_uid == old.st_uid, new.st_gid == old.st_gid
     # With an access list the group's bits are those of the list.
-    if not _copy_attributes(path, handle) or os.fstat(handle).st_gid != old.st_gid:
+    if not _copy_attributes(path, handle) or not kept[1]:
         mode &= ~0o070 | (mode & 0o007) << 3
     os.fchmod(handle, mode)
+    if sys.platform == "linux" and not all(kept):
+        with contextlib.suppress(OSError):  # a file system without lists
+            os.setxattr(handle, ACCESS_LIST, access_list.with_names(_list_of(path), old, kept))
+
+
+def _list_of(path: Path) -> bytes:
+    """Return a file's access list; nothing where it has none."""
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError):
+            return os.getxattr(path, ACCESS_LIST, follow_symlinks=False)
+    return b""
 
 
 def _copy_attributes(path: Path, handle: int) -> bool:

@@ -11,8 +11,8 @@ import errno
 import os
 import platform
 import shutil
+import subprocess
 import sys
-import sysconfig
 from pathlib import Path
 
 from palette4d import _core
@@ -145,11 +145,12 @@ def _reason(error: OSError) -> str:
 
 def _refuse_others_program(bundle: Path) -> None:
     """Check that root alone may change what all users' nodes will run."""
-    # This file: an editable installation runs its sources, which lie elsewhere. The library: a
-    # virtual environment runs that of the Python that made it.
-    libraries = (sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib"))
-    places = (sys.executable, sys.prefix, sys.base_prefix, *libraries, __file__, bundle)
-    for path in map(Path, places):
+    # This file: an editable installation runs its sources, which lie elsewhere. The folders of
+    # modules: a virtual environment has those of its base, and others by files *.pth.
+    ask = [sys.executable, "-E", "-P", "-c", "import sys; print(*sys.path, sep='\\n')"]
+    folders = subprocess.run(ask, check=True, stdout=subprocess.PIPE, encoding="utf-8").stdout
+    places = (sys.executable, sys.prefix, sys.base_prefix, *folders.splitlines(), __file__, bundle)
+    for path in filter(Path.exists, map(Path, places)):
         problem = changeable(path)
         if problem is not None:
             raise Palette4dError(

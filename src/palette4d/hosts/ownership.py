@@ -8,7 +8,7 @@ import stat
 import sys
 from pathlib import Path
 
-from palette4d.common.files import ACCESS_LIST
+from palette4d.common.access_list import ACCESS_LIST
 
 #: Links on the way of a path, as on Linux.
 MOST_LINKS = 40
