@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "fit/object_region.hpp"
+#include "threads/share_rows.hpp"
 
 namespace palette4d {
 namespace {
@@ -101,26 +102,35 @@ Grid blurred(Grid grid) {
     return grid;
 }
 
-/// What one frame shows.
-struct Densities {
-    Grid object = Grid(MatteGrid::kSize);
-    Grid background = object, band = object, part = object, held = object;
-};
+/// Calls work(i) for all numbers below `count`, on all processors.
+template <class Work>
+void for_each_number(std::size_t count, Work work) {
+    share_rows(static_cast<int>(count), 0, [&work](const NextRow& next) {
+        for (int i = next(); i >= 0; i = next()) work(static_cast<std::size_t>(i));
+    });
+}
 
-void add_frame(Densities& all, const View& view, const Parts& parts, double weight) {
+/// What frames show:
+using Densities = std::array<Grid, 5>;  ///< object, background, held, band, its wanted part
+
+Densities densities_of(const View& view, const Parts& parts, double weight) {
+    Densities densities;
+    densities.fill(Grid(MatteGrid::kSize));
+    auto& [object, background, held, mixed, part] = densities;
     Histograms histograms(view);
-    histograms.add(all.object, weight, parts.object, true);
-    histograms.add(all.background, weight, parts.background, true);
-    histograms.add(all.held, weight, parts.held, true);
+    histograms.add(object, weight, parts.object, true);
+    histograms.add(background, weight, parts.background, true);
+    histograms.add(held, weight, parts.held, true);
     const auto count = [](const Mask& mask) {
         return static_cast<double>(std::count(mask.begin(), mask.end(), 1));
     };
     const double band = count(parts.band);
-    if (band == 0) return;
+    if (band == 0) return densities;
     const double counts =
         std::min(std::pow(band / std::max(count(parts.background), 1.0), kEdge), 1.0);
-    histograms.add(all.band, counts * weight, parts.band, false);
-    histograms.add(all.part, counts * weight, parts.band, false, &parts.wanted);
+    histograms.add(mixed, counts * weight, parts.band, false);
+    histograms.add(part, counts * weight, parts.band, false, &parts.wanted);
+    return densities;
 }
 
 /// What other colours leave of the object's, by how near a colour is to both.
@@ -147,8 +157,9 @@ Grid shared(const std::vector<Vec3>& own, const std::vector<Vec3>& others) {
 LearnedMatte learn_matte(const std::vector<LearningFrame>& frames, const Vec3& picked,
                          const std::vector<Vec3>& holds, const DisplayCurve* display) {
     if (frames.empty()) throw std::invalid_argument("learn_matte: found no frame");
-    std::vector<View> views;
-    for (const LearningFrame& frame : frames) views.push_back(reduced(frame, picked, display));
+    std::vector<View> views(frames.size());
+    for_each_number(frames.size(),
+                    [&](std::size_t n) { views[n] = reduced(frames[n], picked, display); });
     const Grid hue = hue_grid(displayed(picked, display));
     MarkedColours marked;
     for (const View& view : views) {
@@ -164,27 +175,31 @@ LearnedMatte learn_matte(const std::vector<LearningFrame>& frames, const Vec3& p
     Grid membership(MatteGrid::kSize), sure;
     for (std::size_t i = 0; i < membership.size(); ++i) membership[i] = hue[i] * left[i];
     for (int round = 0; round < kRounds; ++round) {
-        Densities all;
         // Other frames count once there is something to find the object by.
-        std::size_t count = 0;
-        for (const View& view : views) count += view.seeded || round > 0;
-        for (std::size_t n = 0; n < views.size(); ++n) {
-            const View& view = views[n];
-            if (!view.seeded && round == 0) continue;
-            const Parts parts = find_object(view, membership, sure, marked);
-            // What was clicked on counts as much as all other frames together.
-            const double others = static_cast<double>(count) - 1;
-            add_frame(all, view, parts, n > 0 ? 0.5 / others : others > 0 ? 0.5 : 1.0);
-            if (n > 0 || round + 1 < kRounds) continue;
-            double area = 0;
-            for (const std::uint8_t inside : parts.region) area += inside;
-            learned.share = area / static_cast<double>(view.size());
+        const auto counts = [&](const View& view) { return view.seeded || round > 0; };
+        // What was clicked on counts as much as all other frames together.
+        const double others =
+            static_cast<double>(std::count_if(views.begin(), views.end(), counts)) - 1;
+        std::vector<Densities> each(views.size());
+        for_each_number(views.size(), [&](std::size_t n) {
+            if (!counts(views[n])) return;
+            const Parts parts = find_object(views[n], membership, sure, marked);
+            each[n] = densities_of(views[n], parts, n > 0 ? 0.5 / others : others > 0 ? 0.5 : 1.0);
+            if (n > 0) return;
+            const auto area = static_cast<double>(
+                std::count(parts.region.begin(), parts.region.end(), std::uint8_t{1}));
+            learned.share = area / static_cast<double>(views[n].size());
             learned.found = area > 0;
-        }
-        const Grid object = blurred(std::move(all.object)),
-                   background = blurred(std::move(all.background)),
-                   band = blurred(std::move(all.band)), part = blurred(std::move(all.part)),
-                   held = blurred(std::move(all.held));
+        });
+        Densities all;
+        for_each_number(all.size(), [&](std::size_t kind) {
+            Grid sum(MatteGrid::kSize);
+            for (const Densities& own : each) {
+                for (std::size_t i = 0; i < own[kind].size(); ++i) sum[i] += own[kind][i];
+            }
+            all[kind] = blurred(std::move(sum));
+        });
+        const auto& [object, background, held, band, part] = all;
         sure.resize(membership.size());
         for (std::size_t i = 0; i < membership.size(); ++i) {
             const double f = object[i], b = background[i] + held[i], q = band[i], qm = part[i];

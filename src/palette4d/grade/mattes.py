@@ -71,7 +71,7 @@ class Learned:
     def text(self) -> str:
         """The matte's text: base64 of a zlib stream of the differences of its log odds."""
         steps = np.diff(self.odds.reshape(-1), prepend=np.zeros(1, np.uint8))  # modulo 256
-        return base64.b64encode(zlib.compress(steps.tobytes(), 9)).decode()
+        return base64.b64encode(zlib.compress(steps.tobytes())).decode()
 
 
 def odds_of(text: str) -> Bytes:
