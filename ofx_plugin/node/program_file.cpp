@@ -95,9 +95,15 @@ bool of_me_alone(gid_t group) {
     struct passwd user{}, *me = nullptr;
     struct group about{}, *found = nullptr;
     std::array<char, 16384> of_user{}, of_group{};
-    return ::getpwuid_r(::geteuid(), &user, of_user.data(), of_user.size(), &me) == 0 && me &&
-           ::getgrgid_r(group, &about, of_group.data(), of_group.size(), &found) == 0 && found &&
-           std::strcmp(user.pw_name, about.gr_name) == 0 && !about.gr_mem[0];
+    if (::getpwuid_r(::geteuid(), &user, of_user.data(), of_user.size(), &me) != 0 || !me ||
+        ::getgrgid_r(group, &about, of_group.data(), of_group.size(), &found) != 0 || !found ||
+        std::strcmp(user.pw_name, about.gr_name) != 0) {
+        return false;
+    }
+    for (char** member = about.gr_mem; *member; ++member) {
+        if (std::strcmp(*member, user.pw_name) != 0) return false;
+    }
+    return true;
 }
 
 /// Whether a file has an access list: the group's bits are then those of all whom it names.

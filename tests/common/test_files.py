@@ -205,11 +205,34 @@ def test_users_that_a_list_names_write_one_file_in_turn() -> None:
             file.read_bytes()
 
 
+@pytest.mark.skipif(
+    sys.platform != "linux" or os.geteuid() != 0, reason="needs root, and Linux's attributes"
+)
+@pytest.mark.parametrize("how", ["list", "mode"])
+def test_a_group_that_is_kept_out_stays_out(how: str) -> None:
+    """A group with fewer rights than all others, by name in a list or as the file's group."""
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder).chmod(0o777)
+        file = Path(folder, "shot.p4d.json")
+        file.write_bytes(b"old")
+        os.chown(file, 12345, 12345 if how == "list" else 999)
+        file.chmod(0o644 if how == "list" else 0o604)
+        if how == "list":  # 777, who edits it, is of the group that is kept out
+            entries = [(1, 6, NOBODY), (2, 6, 777), (4, 4, NOBODY), (8, 0, 999)]
+            os.setxattr(file, ACL, access_lists.of(*entries, (16, 6, NOBODY), (32, 4, NOBODY)))
+        with as_user(777 if how == "list" else 12345, 999 if how == "list" else 12345):
+            replace(file, lambda: None)
+        with as_user(888, 999), pytest.raises(PermissionError):
+            file.read_bytes()
+        with as_user(888):
+            assert file.read_bytes() == b"new"
+
+
 @contextlib.contextmanager
-def as_user(user: int) -> Iterator[None]:
+def as_user(user: int, group: int | None = None) -> Iterator[None]:
     groups = os.getgroups()
     os.setgroups([])
-    os.setegid(user)
+    os.setegid(user if group is None else group)
     os.seteuid(user)
     try:
         yield

@@ -325,6 +325,23 @@ def test_the_writer_refuses_what_the_command_was_not_begun_for(tmp_path: Path) -
 
 
 @forks
+def test_a_writer_that_is_killed_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    with script(
+        tmp_path,
+        "import signal",
+        "(own.folder / 'x').write_text('new')",
+        "os.kill(int(Path('/proc/self/task', str(os.getpid()), 'children').read_text()), 9)",
+        "try:",
+        "    own.ask('place', 'x', str(Path('out/out.mov').absolute()), True)",
+        "except Palette4dError as error:",
+        "    print(error, flush=True)",
+        "    os._exit(0)",
+    ) as done:
+        assert "the process that writes files was ended" in done.communicate(timeout=60)[0]
+
+
+@forks
 @pytest.mark.parametrize(
     ("replaces", "placed"),
     [

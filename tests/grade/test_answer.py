@@ -245,6 +245,10 @@ def test_a_pick_over_an_earlier_one_is_told(monkeypatch: pytest.MonkeyPatch) -> 
     document.pick(0, pixel=(41.0, 61.0), box=9, to="#20b040")
     assert note(again(document, "p2"), "p1 takes") is not None
     assert note(again(document, "p1"), "p2 takes") is None
+    document.pick(0, pixel=(42.0, 61.0), box=9, to="#20b041")
+    told = note(again(document, "p3"), "p1 takes")
+    assert told is not None
+    assert "p2" not in told.words  # it changes them in the same way
 
 
 def test_another_hue_that_is_connected_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

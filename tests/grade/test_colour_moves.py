@@ -225,6 +225,20 @@ def test_nothing_changes_outside_of_a_range(data: st.DataObject) -> None:
             assert two.recolour(pixels, frame).tobytes() == pixels.tobytes()
 
 
+def test_a_colour_that_merges_during_a_gap_stays_outside_of_a_range() -> None:
+    """The other colour's way to the common one takes four frames, of which three do not change."""
+    fields = document("merge").fields()
+    polytope = fields["polytope"]
+    polytope["blocks"][1]["first"] = 13
+    for vertex in polytope["vertices"]:
+        vertex["frame"] = 13 if vertex["frame"] == 10 else vertex["frame"]
+    one, two = Document(fields), Document(fields)
+    two.adjust("v4", track=True, by=(0.1, 0, 0), start=13, until=20)
+    for frame in (10, 11, 12):
+        assert not any(delta.any() for delta in difference(one, two, frame).values())
+    assert difference(one, two, 13)["v14"] == pytest.approx([0.1, 0, 0])
+
+
 @settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_earlier_edits_stay_outside_of_a_range(data: st.DataObject) -> None:

@@ -211,7 +211,8 @@ def test_a_stop_beside_the_frame_does_not_spoil_the_hit(plain: Path) -> None:
     document = Document.load(plain)
     seen = document.grade.palette(0.25).edited[document.grade.palette(0.25).ids.index("e1")]
     document.stop("e1", frame=0.3, rgb=seen)
-    document.set_near(seen, frame=0.25, rgb=(0.1, 0.9, 0.4), anyway=True)
+    near = document.set_near(seen, frame=0.25, rgb=(0.1, 0.9, 0.4), anyway=True)
+    assert near.handle == "s2"  # the vertex would go six times as far
     found = np.abs(document.grade.palette(0.25).edited - [0.1, 0.9, 0.4]).max(axis=1)
     assert found.min() < 1e-12
 

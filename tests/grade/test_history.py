@@ -213,6 +213,32 @@ def test_no_step_takes_a_version_away(plain: Path) -> None:
     assert document.grade.note("crimson") == ""
 
 
+def test_the_longest_name_leaves_room_for_former_and_a_number(plain: Path) -> None:
+    document, name = Document.load(plain), "x" * 100
+    for i in range(4):
+        document.set("v1", rgb=(i / 4, 0, 0))
+        document.save_version(name)
+        document.save()
+    document = Document.load(plain)
+    assert len(document.grade.versions) == 4
+    assert max(map(len, document.grade.versions)) <= 100
+
+
+def test_steps_that_were_undone_outlive_another_programs_edit(plain: Path) -> None:
+    mine = Document.load(plain)
+    mine.set("v1", rgb=(1, 0, 0))
+    mine.set("v2", rgb=(1, 0, 0))
+    mine.undo()
+    other = Document.load(plain)
+    other.set("v3", rgb=(0, 1, 0))
+    other.save()
+    mine.save()
+    assert mine.grade.colour("v3") == (0, 1, 0)
+    again = Document.load(plain)
+    again.redo()
+    assert again.grade.colour("v2") == (1, 0, 0)
+
+
 def test_a_removed_version_comes_back(plain: Path) -> None:
     document = Document.load(plain)
     document.set("v1", rgb=(1, 0, 0))

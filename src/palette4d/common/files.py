@@ -330,14 +330,13 @@ def _copy_permissions(path: Path, handle: int) -> None:
         with contextlib.suppress(OSError):
             os.fchown(handle, owner, group)
     mode, new = old.st_mode & 0o777, os.fstat(handle)
-    kept = new.st_uid == old.st_uid, new.st_gid == old.st_gid
     # With an access list the group's bits are those of the list.
-    if not _copy_attributes(path, handle) or not kept[1]:
+    if not _copy_attributes(path, handle) or new.st_gid != old.st_gid:
         mode &= ~0o070 | (mode & 0o007) << 3
     os.fchmod(handle, mode)
-    if sys.platform == "linux" and not all(kept):
+    if sys.platform == "linux" and (new.st_uid, new.st_gid) != (old.st_uid, old.st_gid):
         with contextlib.suppress(OSError):  # a file system without lists
-            os.setxattr(handle, ACCESS_LIST, access_list.with_names(_list_of(path), old, kept))
+            os.setxattr(handle, ACCESS_LIST, access_list.with_names(_list_of(path), old, new))
 
 
 def _list_of(path: Path) -> bytes:

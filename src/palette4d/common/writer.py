@@ -92,7 +92,8 @@ class Writer:
 
     def ask(self, what: str, *arguments: object) -> Any:
         """Let the other process do something; raise its error."""
-        print(json.dumps([what, *arguments]), file=self._requests, flush=True)
+        with contextlib.suppress(BrokenPipeError):  # it has ended: there is no answer
+            print(json.dumps([what, *arguments]), file=self._requests, flush=True)
         return self._answer()
 
     def owns(self, path: Path) -> bool:
@@ -100,7 +101,13 @@ class Writer:
         return self.folder is not None and path.absolute().is_relative_to(self.folder)
 
     def _answer(self) -> Any:
-        found, error = pickle.load(self._answers)  # noqa: S301 - of the process that we trust
+        try:
+            found, error = pickle.load(self._answers)  # noqa: S301 - of the process that we trust
+        except EOFError:
+            raise Palette4dError(
+                "the process that writes files was ended, such as for want of memory; what was "
+                "begun was not written. Run the command again"
+            ) from None
         if error is not None:
             raise error
         return found
