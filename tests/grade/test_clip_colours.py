@@ -49,6 +49,13 @@ def test_shares_are_the_mean_barycentric_weights() -> None:
     assert all(share.mean == share.most == 0 for share in later)
 
 
+def test_between_two_frames_the_colours_of_both_count_in_proportion() -> None:
+    document = with_colours({0: [[0.1, 0.2, 0.3, 0.4]], 8: [[0.4, 0.5, 0.6, 0.8]]})
+    clip = ClipColours(document.grade.core.polytope, document.fields())
+    expected = [[0.1, 0.2, 0.3, 0.3], [0.4, 0.5, 0.6, 0.2]]
+    np.testing.assert_allclose(clip.colours_at(2), expected, atol=1e-9)
+
+
 def test_only_frames_that_have_the_track_count() -> None:
     # The light grey track begins after frame 9.
     grey = [[0.4, 0.4, 0.45, 1.0]]

@@ -327,13 +327,15 @@ def test_picks_are_copied() -> None:
     assert (pick.start, pick.until) == (None, None)
 
 
-@pytest.mark.parametrize(("side", "there"), [(3, False), (4, True)])
-def test_a_few_pixels_of_a_colour_are_no_thing(
-    monkeypatch: pytest.MonkeyPatch, side: int, there: bool
+@pytest.mark.parametrize(
+    ("height", "width", "there"), [(3, 3, False), (4, 4, True), (2, 50, False), (3, 50, True)]
+)
+def test_a_few_pixels_of_a_colour_or_a_rim_are_no_thing(
+    monkeypatch: pytest.MonkeyPatch, height: int, width: int, there: bool
 ) -> None:
-    """Of a frame of 200 x 100 pixels, a connected region of ten is needed."""
+    """Of a frame of 200 x 100 pixels, a connected region of ten is needed, wider than a rim."""
     frames = np.full((2, 100, 200, 3), 0.5, np.float32)
-    frames[:, 40 : 40 + side, 60 : 60 + side] = (0.8, 0.2, 0.1)
+    frames[:, 40 : 40 + height, 60 : 60 + width] = (0.8, 0.2, 0.1)
     monkeypatch.setattr("palette4d.grade.clip_of_picks.find_clip", lambda *_: ArrayClip(frames))
     fields = {"size": (200, 100), "frames": {"first": 0, "last": 1, "step": 1}}
     pick = Pick("p1", "pick", 9, (0.8, 0.2, 0.1), to=(0.1, 0.2, 0.8))

@@ -40,6 +40,19 @@ def test_the_weights_of_a_frames_colours_sum_to_one(document, image):
         np.testing.assert_allclose(matte, weights[..., index], atol=3e-4)
 
 
+@pytest.mark.parametrize(("space", "lightness"), [("input", "rec709"), ("palette", "ap1")])
+def test_the_lightness_is_that_of_the_images_own_space(image, space, lightness):
+    """The clip is linear Rec. 709, its palette ACEScct."""
+    document = Document.load(GOLDEN / "v1_scene_linear.p4d.json")
+    document.adjust(by=(0.2, -0.1, 0.05))
+    kept = {
+        how: document.recolour(image, 0, keep_lightness=1, lightness_of=how, space=space)
+        for how in ("auto", "rec709", "ap1")
+    }
+    assert kept["auto"].tobytes() == kept[lightness].tobytes()
+    assert kept["rec709"].tobytes() != kept["ap1"].tobytes()
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
