@@ -107,6 +107,14 @@ def test_several_edits_are_one_step(plain: Path) -> None:
     assert document.fields() == before
 
 
+def test_under_another_name_the_history_stays_small_too(plain: Path, tmp_path: Path) -> None:
+    document = Document.load(plain)
+    for i in range(250):
+        document.set("v1", rgb=(i / 1000, 0, 0))
+    document.save(tmp_path / "other.p4d.json")
+    assert len(Document.load(tmp_path / "other.p4d.json").history.done) == 200
+
+
 def test_the_history_stays_small(plain: Path) -> None:
     document = Document.load(plain)
     for i in range(700):

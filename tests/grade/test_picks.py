@@ -298,6 +298,23 @@ def test_a_window_is_followed_when_the_clip_is_read(monkeypatch: pytest.MonkeyPa
     assert not history.done[-1].unread
 
 
+@pytest.mark.parametrize("kept", [False, True])
+def test_a_newer_window_is_read_in_place_of_an_older_one_that_no_version_has(
+    monkeypatch: pytest.MonkeyPatch, kept: bool
+) -> None:
+    document = moving(monkeypatch)
+    document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
+    for box in (BOX, (0, 0, 60, 60)):
+        document.set_window("p1", 0, box, clip=later.Unread())
+        document.history = later.as_unread(document.history)
+        if kept and box == BOX:
+            document.save_version("first")
+    old, new = document.history.done[-2:]
+    assert later.replaces(new, old, document.grade.state) == (not kept)
+    waiting = [step for _, _, step in later.unread(document.grade, document.history)]
+    assert waiting == ([old, new] if kept else [new])
+
+
 def test_a_window_that_was_not_to_be_followed_stays_when_other_things_are_read_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
