@@ -34,6 +34,13 @@ from palette4d.hosts.bundle import (
 )
 
 
+@pytest.fixture(autouse=True)
+def quick(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tests of other things than root's look at all of Python do without it: it takes a second."""
+    if "root_installs_no" not in request.node.name:
+        monkeypatch.setattr(bundles, "_refuse_others_program", lambda _: None)
+
+
 def make_bundle(root: Path, content: bytes = b"code") -> Path:
     bundle = root / BUNDLE
     binary = bundle / "Contents" / "Linux-x86-64" / "Palette4D.ofx"
@@ -128,8 +135,8 @@ def test_root_installs_no_sources_of_another_user(
 ) -> None:
     """As in an editable installation (`pip install -e`) of a folder of theirs."""
     sources = tmp_path / "sources"
-    sources.mkdir()
-    monkeypatch.setattr(bundles, "__file__", str(sources))
+    (sources / "hosts").mkdir(parents=True)
+    monkeypatch.setattr(bundles, "__file__", str(sources / "hosts" / "bundle.py"))
     os.chown(sources, 12345, 12345)
     with pytest.raises(Palette4dError, match=r"sources .*belongs to another user"):
         install_bundle(bundle, tmp_path / "OFX")
@@ -153,7 +160,7 @@ def test_root_installs_nothing_that_a_link_of_another_user_leads_to(
 
 
 @gifts
-@pytest.mark.parametrize("what", ["base", "pth"])
+@pytest.mark.parametrize("what", ["base", "pth", "module", "settings", "linked"])
 def test_root_installs_no_environment_of_another_users_python(
     bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
@@ -162,11 +169,20 @@ def test_root_installs_no_environment_of_another_users_python(
     theirs.mkdir()
     venv.create(tmp_path / "venv")
     monkeypatch.setattr(sys, "executable", str(tmp_path / "venv/bin/python"))
+    (site,) = (tmp_path / "venv/lib").glob("*/site-packages")
     if what == "base":
         monkeypatch.setattr(sys, "base_prefix", str(theirs))
+    elif what == "pth":
+        (site / "other.pth").write_text(f"{theirs}\n", "utf-8")
+    elif what == "module":
+        theirs = site / "package" / "theirs"
+        theirs.mkdir(parents=True)
+    elif what == "linked":
+        (site / "package").symlink_to(theirs)
     else:
-        (site,) = (tmp_path / "venv/lib").glob("*/site-packages")
-        (site / "theirs.pth").write_text(f"{theirs}\n", "utf-8")
+        theirs = (tmp_path / "venv/pyvenv.cfg").rename(tmp_path / "venv/theirs")
+        (tmp_path / "venv/pyvenv.cfg").symlink_to("theirs")
+        monkeypatch.setattr(sys, "prefix", str(tmp_path / "venv"))
     install_bundle(bundle, tmp_path / "OFX")
     os.chown(theirs, 12345, 12345)
     with pytest.raises(Palette4dError, match=r"theirs belongs to another user"):

@@ -18,7 +18,7 @@ from pathlib import Path
 from palette4d import _core
 from palette4d.common.errors import Arg, Palette4dError, WriteError
 from palette4d.common.files import replacing, temporary_folder
-from palette4d.hosts.ownership import changeable, runs_as_root
+from palette4d.hosts.ownership import changeable, changeable_within, runs_as_root
 
 BUNDLE = "Palette4D.ofx.bundle"
 _PLUGINS = "OFX/Plugins"
@@ -149,9 +149,12 @@ def _refuse_others_program(bundle: Path) -> None:
     # modules: a virtual environment has those of its base, and others by files *.pth.
     ask = [sys.executable, "-E", "-P", "-c", "import sys; print(*sys.path, sep='\\n')"]
     folders = subprocess.run(ask, check=True, stdout=subprocess.PIPE, encoding="utf-8").stdout
-    places = (sys.executable, sys.prefix, sys.base_prefix, *folders.splitlines(), __file__, bundle)
-    for path in filter(Path.exists, map(Path, places)):
-        problem = changeable(path)
+    above = (sys.executable, sys.prefix, sys.base_prefix, f"{sys.prefix}/pyvenv.cfg")
+    within = (*folders.splitlines(), Path(__file__).parents[1], bundle)
+    checks = [(changeable, Path(path)) for path in above]
+    checks += [(changeable_within, Path(path)) for path in within]
+    for check, path in checks:
+        problem = check(path) if path.exists() else None
         if problem is not None:
             raise Palette4dError(
                 f"{path}: {problem}. Every user's node would run what that one puts there. Install "

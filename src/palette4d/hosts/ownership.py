@@ -46,6 +46,22 @@ def changeable(path: Path, owner: int = 0) -> str | None:
     return problem
 
 
+def changeable_within(folder: Path, owner: int = 0) -> str | None:
+    """Return the same of a folder with all that is in it; of links in it, where they lead too."""
+    problem = changeable(folder, owner)
+    for parent, folders, names in os.walk(folder):
+        for name in (*folders, *names):
+            about = os.lstat(f"{parent}/{name}")
+            if about.st_uid in (0, owner) and not about.st_mode & 0o022:  # nearly all; links not
+                continue
+            place = Path(parent, name)
+            leads = place.is_symlink() and place.exists()
+            problem = problem or (changeable if leads else _changeable_itself)(place, owner)
+        if problem is not None:
+            return problem
+    return problem
+
+
 def _changeable_itself(place: Path, owner: int) -> str | None:
     """Return what is wrong with a file, a folder or a link, whatever is above it."""
     about = place.lstat()
