@@ -595,20 +595,22 @@ def test_the_pipette_takes_a_colour_of_the_picture(qtbot: Any, opened: Window) -
 
 
 def test_versions_are_kept_and_used(qtbot: Any, opened: Window) -> None:
-    session, versions = opened.session, opened.inspector.versions
+    session, gallery = opened.session, opened.gallery
+    opened.show_or_hide("versions")
     document = session.document
     assert document is not None
     id_ = document.grade.core.polytope.vertex_ids[0]
     before = document.grade.colour(id_)
-    qtbot.mouseClick(versions.keep, LEFT)
+    qtbot.mouseClick(gallery.buttons["keep"], LEFT)
     session.edit(lambda d: d.set(id_, rgb=NEW))
-    qtbot.mouseClick(versions.keep, LEFT)
-    assert list(versions.buttons) == ["A", "B"]
-    qtbot.mouseClick(versions.buttons["A"], LEFT)
+    qtbot.mouseClick(gallery.buttons["keep"], LEFT)
+    assert session.versions == ("A", "B")
+    gallery.list.clearSelection()
+    gallery.list.item(0).setSelected(True)
+    qtbot.mouseClick(gallery.buttons["use"], LEFT)
     assert session.document is not None
     assert session.document.grade.colour(id_) == before
-    assert versions.buttons["A"].isChecked()
-    assert not versions.buttons["B"].isChecked()
+    assert session.document.grade.same_edits == ("A",)
 
 
 def test_the_menu_of_a_range_changes_the_pick(qtbot: Any, opened: Window) -> None:

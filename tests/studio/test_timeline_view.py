@@ -159,7 +159,7 @@ def test_a_stop_is_dragged_to_whole_frames_and_stays_inside_its_edge(
 
 
 def test_rows_that_have_no_room_are_scrolled_by_the_bar(qtbot: Any, view: TimelineView) -> None:
-    view.resize(500, 150)
+    view.resize(500, 110)
     places = view.places
     assert places.hidden > 0
     assert places.top == places.upper + places.head

@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from palette4d.studio.window import Window
 
 
@@ -47,6 +49,7 @@ def test_the_bar_never_lies_over_the_picture(opened: Window, qtbot: Any) -> None
 TABS = """
 import sys
 from pathlib import Path
+import pytest
 from PySide6.QtWidgets import QTabBar
 from palette4d.studio import app
 
@@ -55,18 +58,19 @@ def tell(window):
         if bar.isVisible() and window.rect().intersects(bar.geometry()):
             print(bar.geometry().x(), bar.count())
 
-app.run(None, screenshot=Path(sys.argv[1]), size=(1000, 600), prepare=tell)
+app.run(None, screenshot=Path(sys.argv[1]), size=(1000, int(sys.argv[2])), prepare=tell)
 """
 
 
-def test_each_row_of_tabs_is_drawn_once(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("height", "count"), [(600, 1), (900, 2)])
+def test_each_row_of_tabs_is_drawn_once(tmp_path: Path, height: int, count: int) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", TABS, str(tmp_path / "window.png")],
+        [sys.executable, "-c", TABS, str(tmp_path / "window.png"), str(height)],
         capture_output=True,
         text=True,
         timeout=120,
         check=True,
     )
     rows = sorted(done.stdout.split("\n")[:-1])
-    assert len(rows) == 2, rows
+    assert len(rows) == count, rows
     assert len({row.split()[0] for row in rows}) == 1, rows

@@ -297,3 +297,69 @@ def test_every_action_has_a_method_and_no_key_twice(window: Window) -> None:
     assert len(keys) == len(set(keys))
     for action in menu_entries.ACTIONS:
         assert callable(window.action(action.name))
+
+
+def test_a_low_window_has_a_large_picture_and_all_of_a_pick(
+    opened: Window, settle: Settle, qtbot: Any
+) -> None:
+    high = opened.docks["solid"].geometry()
+    for k in range(4):
+        colour = (0.1 + 0.15 * k, 0.5, 0.4)
+        opened.session.edit(
+            lambda d, colour=colour: d.pick(6, colour=colour, by=(0.1, 0, 0), follow=False)
+        )
+    opened.session.select("p1")
+    opened.resize(1000, 600)
+    settle(opened)
+    viewer, inspector, panel = opened.viewer, opened.inspector, opened.inspector.panel
+    assert viewer.height() >= 300
+    assert viewer.height() > opened.timeline.height()
+    assert inspector.isVisible()
+    assert not opened.solid.isVisible() or opened.solid.visibleRegion().isEmpty()
+    for part in (inspector.wheel, panel.add, panel.hold, panel.matte, panel.takes):
+        assert part.visibleRegion().boundingRect().height() > part.height() - 4, part
+    assert rows_seen(opened) == 4
+    opened.resize(1200, 900)
+    qtbot.waitUntil(lambda: not opened.solid.visibleRegion().isEmpty())
+    assert opened.docks["solid"].geometry().top() == high.top()
+
+
+def rows_seen(window: Window) -> int:
+    """Return how many rows of the list of picks are seen whole."""
+    rows = window.inspector.picks.list
+    inside = rows.viewport().rect()
+    boxes = [rows.visualItemRect(rows.topLevelItem(k)) for k in range(rows.topLevelItemCount())]
+    return sum(box.isValid() and inside.contains(box) for box in boxes)
+
+
+def test_an_answer_that_comes_moves_no_row_and_no_button(
+    opened: Window, settle: Settle, qtbot: Any
+) -> None:
+    panel, rows = opened.inspector.panel, opened.inspector.picks.list
+    for k in range(4):
+        colour = (0.1 + 0.15 * k, 0.5, 0.4)
+        opened.session.edit(
+            lambda d, colour=colour: d.pick(6, colour=colour, by=(0.1, 0, 0), follow=False)
+        )
+    opened.resize(1600, 1000)
+    opened.arrange()
+    opened.session.select()
+    settle(opened)
+
+    def places() -> list[object]:
+        parts = (opened.inspector.wheel, panel.add, panel.hold, panel.matte, rows)
+        return [part.mapTo(opened, part.rect().topLeft()) for part in parts]
+
+    before = rows.mapTo(opened, rows.rect().topLeft())
+    opened.session.select("p1")
+    qtbot.wait(50)  # laid out, without an answer
+    assert not panel.settled
+    empty = places()
+    settle(opened)
+    assert panel.takes.words.text()
+    for line in panel.notes:
+        line.say("Also takes its colour elsewhere, 3.3 %, in many words that need two lines.")
+    qtbot.wait(50)
+    assert places() == empty
+    assert rows.mapTo(opened, rows.rect().topLeft()) == before
+    assert rows_seen(opened) == 4

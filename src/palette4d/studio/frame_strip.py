@@ -55,6 +55,8 @@ class FrameStrip:
 
     def paint(self, painter: QPainter) -> None:
         """Draw the strip; its frames are drawn again only when something in them changed."""
+        if not self.places.strip:
+            return
         session = self.session
         now = None if session.dragging else (session.revision, session.looked)
         key = self.places.scale, self.places.width, self.ratio, now
@@ -85,7 +87,7 @@ class FrameStrip:
     def thumbnails(self) -> list[tuple[int, QRectF]]:
         """Return the frames of the strip and their places."""
         clip = self.session.clip
-        if clip is None or not clip.frames:
+        if clip is None or not clip.frames or not self.places.strip:
             return []
         tall = STRIP - 6
         wide = max(20.0, tall * clip.width / max(clip.height, 1))

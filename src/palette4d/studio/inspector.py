@@ -1,4 +1,4 @@
-"""The inspector: the selected colour, what it becomes, and the picks and holds.
+"""The inspector: the selected colour and what it becomes, and below it the picks and holds.
 
 Its wheel, bars and numbers all choose a colour; what that changes is the scope: the selected
 handles, their tracks, or the whole palette.
@@ -19,7 +19,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QPushButton,
-    QScrollArea,
     QSizePolicy,
     QToolButton,
     QVBoxLayout,
@@ -38,8 +37,8 @@ from palette4d.studio import grade_steps, texts, theme
 from palette4d.studio.choice import Choice
 from palette4d.studio.colour_widgets import Bar, Swatch, Wheel
 from palette4d.studio.number import Number
-from palette4d.studio.pick_list import PickList, Versions
-from palette4d.studio.pick_panel import PickPanel
+from palette4d.studio.pick_list import PickList
+from palette4d.studio.pick_panel import PickPanel, scrolled
 from palette4d.studio.row_names import row_name
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
@@ -50,8 +49,8 @@ F64 = NDArray[np.float64]
 U8 = NDArray[np.uint8]
 Scope = Literal["handle", "track", "palette"]
 
-#: The width that a scroll bar takes.
-SCROLL_BAR = 10
+#: The parts of the height that the colour has, and the lists below it.
+UPPER, LOWER = 11, 9
 #: Colours of a bar.
 SAMPLES = 24
 
@@ -68,6 +67,7 @@ class Inspector(QWidget):
         self._tried: tuple[float, ...] = ()  # the colour that a drag shows
         self._settled: Target | None = None  # the target without the edit of a drag
         self._lch: tuple[str, Lch] | None = None
+        self.panel, self.picks = PickPanel(session), PickList(session)
         self._make()
         for event in ("document", "selection", "frame", "view", "clip"):
             session.on(event, self.refresh, panel=True, follows=lambda: True)
@@ -79,30 +79,25 @@ class Inspector(QWidget):
     def _make(self) -> None:
         content = QWidget()
         column = QVBoxLayout(content)
-        column.setContentsMargins(10, 8, 10, 10)
+        column.setContentsMargins(10, 8, 10, 8)
         column.setSpacing(8)
         column.addLayout(self._make_head())
         column.addWidget(self._make_scope())
         column.addLayout(self._make_colour())
         column.addLayout(self._make_hex())
-        column.addLayout(self._make_buttons())
-        self.panel = PickPanel(self.session)
-        column.addWidget(self.panel)
-        self.picks = PickList(self.session)
-        column.addWidget(self.picks, 1)
-        self.versions = Versions(self.session)
-        column.addWidget(self.versions)
-        column.addStretch(0)
-        area = QScrollArea()
-        area.setWidget(content)
-        area.setWidgetResizable(True)
-        area.setFrameShape(QScrollArea.Shape.NoFrame)
-        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        area.setMinimumWidth(content.minimumSizeHint().width() + SCROLL_BAR)
+        column.addWidget(self.panel.shape)
+        column.addStretch(1)
+        # Each half has its height, whatever stands in the other: nothing moves under the pointer.
         whole = QVBoxLayout(self)
         whole.setContentsMargins(0, 0, 0, 0)
-        whole.addWidget(area)
-        self.column = column
+        whole.setSpacing(0)
+        whole.addWidget(scrolled(content), UPPER)
+        self.lower = QWidget()
+        below = QVBoxLayout(self.lower)
+        below.setContentsMargins(10, 4, 10, 8)
+        below.addWidget(self.picks, 1)
+        below.addWidget(self.panel, 1)
+        whole.addWidget(self.lower, LOWER)
 
     def _make_head(self) -> QHBoxLayout:
         row = QHBoxLayout()
@@ -140,13 +135,7 @@ class Inspector(QWidget):
             row.addWidget(button)
             self.scopes[name] = button
         self.scopes["handle"].setChecked(True)
-        row.addSpacing(8)
-        label = QLabel(texts.RAMP)
-        label.setStyleSheet(f"color: {theme.FAINT}")
-        row.addWidget(label)
-        row.addSpacing(4)
         self.ramp = Choice()
-        label.setBuddy(self.ramp)
         self.ramp.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
@@ -157,6 +146,7 @@ class Inspector(QWidget):
         for ramp in RAMPS:
             self.ramp.addItem(texts.RAMPS[ramp], ramp)
         self.ramp.activated.connect(self._ramp_chosen)
+        row.addSpacing(6)
         row.addWidget(self.ramp)
         return self.scope_row
 
@@ -212,23 +202,16 @@ class Inspector(QWidget):
         self.shown_hex.setStyleSheet(f"color: {theme.FAINT}")
         self.shown_hex.setToolTip(texts.SHOWN_TIP)
         self.shown_hex.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        row.addWidget(self.hex_label)
-        row.addWidget(self.hex)
-        row.addWidget(self.shown_hex, 1)
-        return row
-
-    def _make_buttons(self) -> QHBoxLayout:
-        row = QHBoxLayout()
-        row.setSpacing(6)
+        self.shown_hex.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.dropper = QPushButton(texts.EYEDROPPER)
         self.dropper.setCheckable(True)
         self.dropper.setToolTip(texts.EYEDROPPER_TIP)
         self.reset = QPushButton(texts.RESET_SHORT)
         self.reset.setToolTip(texts.RESET)
         self.reset.clicked.connect(lambda: grade_steps.reset(self.session))
-        row.addWidget(self.dropper)
-        row.addWidget(self.reset)
-        row.addStretch(1)
+        for part in (self.hex_label, self.hex, self.dropper, self.reset):
+            row.addWidget(part)
+        row.addWidget(self.shown_hex, 1)
         return row
 
     # ----------------------------------------------------------------------------- what it shows
@@ -258,6 +241,7 @@ class Inspector(QWidget):
             self._show_words(len(session.selection))
             self._show_ramp()
         self._show_colour(targets[1:])
+        self.lower.setVisible(not self.picks.isHidden() or not self.panel.isHidden())
 
     def _show_words(self, count: int) -> None:
         target = self.target
@@ -269,7 +253,7 @@ class Inspector(QWidget):
         for part in self.scopes.values():
             part.setEnabled(target is not None)
         self.scope_row.setVisible(target is None or not target.picked)
-        self.reset.setEnabled(
+        self.reset.setVisible(
             document is not None
             and any(id_ in document.grade.settings for id_ in self.session.selection)
         )

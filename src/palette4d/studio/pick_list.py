@@ -1,4 +1,4 @@
-"""Lists below the inspected colour: picks, holds and locks with when they act, and versions."""
+"""The list below the inspected colour: picks, holds and locks, with when they act."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QHeaderView,
     QLabel,
     QPushButton,
-    QToolButton,
     QTreeWidget,
     QTreeWidgetItem,
     QVBoxLayout,
@@ -27,6 +26,8 @@ U8 = NDArray[np.uint8]
 
 #: The size of the colours before a pick's name.
 ICON = QSize(34, 14)
+#: The least rows that are seen at a time.
+ROWS = 4
 ID = Qt.ItemDataRole.UserRole
 
 
@@ -43,12 +44,12 @@ class PickList(QWidget):
         self.list = QTreeWidget()
         self.list.setAccessibleName(texts.PICK_LIST)
         self.list.setColumnCount(2)
-        self.list.setHeaderLabels(texts.PICK_COLUMNS)
+        self.list.setHeaderHidden(True)
         self.list.setRootIsDecorated(False)
         self.list.setUniformRowHeights(True)
         self.list.setIconSize(ICON)
         self.list.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
-        self.list.setMinimumHeight(96)
+        self.list.setMinimumHeight(ROWS * (self.list.fontMetrics().height() + 4))
         header = self.list.header()
         header.setStretchLastSection(False)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
@@ -161,60 +162,3 @@ def icon_of(widget: QWidget, before: U8, after: U8, *, hold: bool = False) -> QI
             )
     painter.end()
     return QIcon(picture)
-
-
-class Versions(QWidget):
-    """The versions of the grade: a button uses one."""
-
-    def __init__(self, session: Session) -> None:
-        """Listen to the session."""
-        super().__init__()
-        self.session = session
-        self._shown: tuple[object, ...] = ()
-        label = QLabel(texts.VERSIONS)
-        label.setStyleSheet(f"color: {theme.FAINT}")
-        self.row = QHBoxLayout(self)
-        self.row.setContentsMargins(0, 0, 0, 0)
-        self.row.setSpacing(4)
-        self.row.addWidget(label)
-        self.row.addSpacing(4)
-        self.buttons: dict[str, QToolButton] = {}
-        self.row.addStretch(1)
-        self.keep = QPushButton(texts.KEEP)
-        self.keep.setToolTip(texts.KEEP_TIP)
-        self.keep.clicked.connect(lambda: grade_steps.keep_version(session))
-        self.row.addWidget(self.keep)
-        session.on("document", self.refresh, panel=True)
-        self.refresh()
-
-    def refresh(self) -> None:
-        """Show the versions; the one whose edits are in use is checked."""
-        document = self.session.document
-        self.keep.setEnabled(document is not None)
-        if self.session.dragging:
-            return
-        names = () if document is None else document.grade.versions
-        used = () if document is None else document.grade.same_edits
-        if (names, used) == self._shown:
-            return
-        self._shown = (names, used)
-        for button in self.buttons.values():
-            self.row.removeWidget(button)
-            button.hide()
-            button.deleteLater()
-        self.buttons = {}
-        for number, name in enumerate(names, 1):
-            button = QToolButton()
-            button.setText(f"{texts.USED} {name}" if name in used else name)
-            button.setCheckable(True)
-            button.setChecked(name in used)
-            button.setToolTip(theme.plain(texts.USE_TIP.format(name=name, number=number)))
-            button.clicked.connect(lambda _=False, name=name: self.use(name))
-            self.row.insertWidget(1 + number, button)
-            self.buttons[name] = button
-
-    def use(self, name: str) -> None:
-        """Use a version."""
-        grade_steps.use_version(self.session, name)
-        self._shown = ()
-        self.refresh()

@@ -1,4 +1,4 @@
-"""The panel of the selected pick or hold: its matte, and what it takes of its frame."""
+"""The selected pick or hold: its matte, its tools, and what it takes of its frame."""
 
 from dataclasses import replace
 
@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QPushButton,
+    QScrollArea,
     QVBoxLayout,
     QWidget,
 )
@@ -45,6 +46,8 @@ WARNS = f"color: {theme.WARNING}"
 SAMPLES = 24
 #: The width of the numbers beside the bars.
 NUMBERS = 72
+#: The width that a scroll bar takes.
+SCROLL_BAR = 10
 #: The size of a colour before a line.
 SWATCH = QSize(14, 14)
 
@@ -81,7 +84,13 @@ class Line(QWidget):
 
 
 class PickPanel(QWidget):
-    """Reach, softness and lightness of the selected pick, its tools, and its answer."""
+    """The tools of the selected pick and its answer, which scrolls.
+
+    Attributes
+    ----------
+    shape : QWidget
+        Reach, softness, lightness and window; it stands elsewhere.
+    """
 
     def __init__(self, session: Session) -> None:
         """Listen to the session."""
@@ -101,7 +110,12 @@ class PickPanel(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(6)
         column.addLayout(self._make_tools())
-        column.addWidget(self._make_shape())
+        self._make_shape()
+        answer = QWidget()
+        lines = QVBoxLayout(answer)
+        lines.setContentsMargins(0, 0, 0, 0)
+        lines.setSpacing(6)
+        column.addWidget(scrolled(answer), 1)
         self.takes, self.warning = Line(), Line()
         self.takes.button.setText(texts.HERE_TOOL)
         self.takes.button.setToolTip(texts.HERE_TOOL_TIP)
@@ -112,7 +126,8 @@ class PickPanel(QWidget):
             line.button.clicked.connect(lambda _=False, k=k: self._do(k))
         self.warning.words.setStyleSheet(WARNS)
         for line in (self.takes, *self.notes, self.warning):
-            column.addWidget(line)
+            lines.addWidget(line)
+        lines.addStretch(1)
         for event in ("document", "selection", "clip"):
             session.on(event, self.refresh, panel=True, follows=lambda: True)
             session.on(event, lambda: self._resting.start(REST))
@@ -142,13 +157,9 @@ class PickPanel(QWidget):
         self.hold.clicked.connect(lambda on: session.take("hold" if on else ""))
         self.matte.clicked.connect(lambda on: session.look(matte=on))
         row.addStretch(1)
-        self.whole_hue = QCheckBox(texts.WHOLE_HUE)
-        self.whole_hue.setToolTip(texts.WHOLE_HUE_TIP)
-        self.whole_hue.clicked.connect(self._toggled)
-        row.addWidget(self.whole_hue)
         return row
 
-    def _make_shape(self) -> QWidget:
+    def _make_shape(self) -> None:
         self.shape = QWidget()
         grid = QGridLayout(self.shape)
         grid.setContentsMargins(0, 0, 0, 0)
@@ -179,9 +190,11 @@ class PickPanel(QWidget):
         self.lightness.moved.connect(lambda span: self._moved("lightness", span))
         self.lightness.let_go.connect(self.session.drop)
         _add_row(grid, 2, texts.LIGHTNESS_TIP, label, self.lightness, self.lightness_words)
-        self.window_rows = WindowRows(self.session, grid, 3)
+        self.whole_hue = QCheckBox(texts.WHOLE_HUE)
+        self.whole_hue.setToolTip(texts.WHOLE_HUE_TIP)
+        self.whole_hue.clicked.connect(self._toggled)
+        self.window_rows = WindowRows(self.session, grid, 3, self.whole_hue)
         grid.setColumnStretch(1, 1)
-        return self.shape
 
     # ------------------------------------------------------------------------------ what it shows
 
@@ -189,10 +202,9 @@ class PickPanel(QWidget):
         """Show the selected pick or hold."""
         pick = self.session.picked
         self.setVisible(pick is not None)
+        self.shape.setVisible(pick is not None and pick.kind == "pick")
         if pick is None:
             return
-        self.shape.setVisible(pick.kind == "pick")
-        self.whole_hue.setVisible(pick.kind == "pick")
         self._show_shape(pick)
         self.window_rows.refresh()
         self._show_tool()
@@ -358,6 +370,17 @@ class PickPanel(QWidget):
                 line.button.setText(texts.ADD_GESTURE.get(note.gesture, ""))
                 line.button.setToolTip(note.effect)
         self.warning.say("\n".join(told))
+
+
+def scrolled(content: QWidget) -> QScrollArea:
+    """Return an area in which something scrolls up and down."""
+    area = QScrollArea()
+    area.setWidget(content)
+    area.setWidgetResizable(True)
+    area.setFrameShape(QScrollArea.Shape.NoFrame)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setMinimumWidth(content.minimumSizeHint().width() + SCROLL_BAR)
+    return area
 
 
 def _sentence(words: str) -> str:

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QPushButton,
+    QWidget,
 )
 
 from palette4d.grade.picks import MOST_PIXELS, Box, Window
@@ -35,9 +36,11 @@ class WindowRows(QObject):
         The panel's rows: a name, a bar, a number.
     line : int
         The first row that is free.
+    beside : QWidget
+        Stands beside the switch.
     """
 
-    def __init__(self, session: Session, grid: QGridLayout, line: int) -> None:
+    def __init__(self, session: Session, grid: QGridLayout, line: int, beside: QWidget) -> None:
         super().__init__()
         self.session = session
         self._typed: tuple[str, float, Box] | None = None  # a box that is not followed yet
@@ -47,7 +50,12 @@ class WindowRows(QObject):
         self.on = QCheckBox(texts.WINDOW)
         self.on.setToolTip(texts.WINDOW_TIP)
         self.on.clicked.connect(self._switched)
-        grid.addLayout(self._make_numbers(), line, 0, 1, 3)
+        switches = QHBoxLayout()
+        switches.addWidget(self.on)
+        switches.addStretch(1)
+        switches.addWidget(beside)
+        grid.addLayout(switches, line, 0, 1, 3)
+        grid.addLayout(self._make_numbers(), line + 1, 0, 1, 3)
         self.label, self.bar = QLabel(texts.FEATHER), Bar(texts.FEATHER, 1.0)
         self.feather = Number(texts.FEATHER, 0, MOST_PIXELS, 1, 1, BESIDE)
         self.feather.valueChanged.connect(self._feather_typed)
@@ -56,23 +64,21 @@ class WindowRows(QObject):
         self.label.setBuddy(self.feather)
         for place, part in enumerate((self.label, self.bar, self.feather)):
             part.setToolTip(texts.FEATHER_TIP)
-            grid.addWidget(part, line + 1, place)
+            grid.addWidget(part, line + 2, place)
         self.lost = QLabel()
         self.lost.setTextFormat(Qt.TextFormat.PlainText)
         self.lost.setWordWrap(True)
         self.lost.setStyleSheet(f"color: {theme.WARNING}")
-        grid.addWidget(self.lost, line + 2, 0, 1, 3)
+        grid.addWidget(self.lost, line + 3, 0, 1, 3)
         self.remove = QPushButton()
         self.remove.setToolTip(texts.REMOVE_BOX_TIP)
         self.remove.clicked.connect(self._remove_box)
-        grid.addWidget(self.remove, line + 3, 0, 1, 3, Qt.AlignmentFlag.AlignLeft)
+        grid.addWidget(self.remove, line + 4, 0, 1, 3, Qt.AlignmentFlag.AlignLeft)
         session.on("frame", self.refresh, panel=True)
 
     def _make_numbers(self) -> QHBoxLayout:
         row = QHBoxLayout()
         row.setSpacing(3)
-        row.addWidget(self.on)
-        row.addStretch(1)
         self.numbers: dict[str, Number] = {}
         self._names = []
         for name, (short, what) in texts.WINDOW_NUMBERS.items():
@@ -83,6 +89,7 @@ class WindowRows(QObject):
             for part in (label, box):
                 part.setToolTip(what)
                 row.addWidget(part)
+            row.addStretch(1)
             self.numbers[name] = box
             self._names.append(label)
         return row

@@ -66,7 +66,7 @@ QListView, QTreeView {{ background: {PANEL}; border: none;
   alternate-background-color: #2a2a2a; }}
 QListView::item {{ padding: 3px 6px; }}
 QHeaderView::section {{ background: {PAGE}; color: {FAINT}; border: none; padding: 4px 6px; }}
-QTabBar::tab {{ background: {PAGE}; color: {FAINT}; padding: 5px 12px; border: none; }}
+QTabBar::tab {{ background: {PAGE}; color: {FAINT}; padding: 5px 7px; border: none; }}
 QTabBar::tab:selected {{ background: {PANEL}; color: {BRIGHT}; }}
 QTabWidget::pane {{ border: none; background: {PANEL}; }}
 QScrollBar:vertical {{ background: transparent; width: 10px; margin: 0; }}

@@ -8,7 +8,7 @@ from palette4d.plotting import style
 from palette4d.studio import paint
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
-from palette4d.studio.timeline_places import GUTTER, RULER, STRIP, Places
+from palette4d.studio.timeline_places import GUTTER, RULER, Places
 
 
 def paint_lanes(painter: QPainter, session: Session, places: Places) -> None:
@@ -20,7 +20,7 @@ def paint_lanes(painter: QPainter, session: Session, places: Places) -> None:
     if not picks:
         return
     painter.save()
-    painter.setClipRect(QRectF(GUTTER, RULER + STRIP, places.width - GUTTER, places.upper))
+    painter.setClipRect(QRectF(GUTTER, RULER + places.strip, places.width - GUTTER, places.upper))
     for pick, lane in picks:
         y, half = places.lane_y(lane), places.lane_height / 2 - 1
         begin, start, until, end = (places.x_of(t) for t in places.reach(pick))

@@ -19,7 +19,7 @@ from palette4d.studio.frame_strip import FrameStrip
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
 from palette4d.studio.timeline_lanes import paint_lanes
-from palette4d.studio.timeline_places import FOOT, GUTTER, RULER, SIDE, STRIP, TAIL, Places
+from palette4d.studio.timeline_places import FOOT, GUTTER, RULER, SIDE, TAIL, Places
 
 F64 = NDArray[np.float64]
 #: The lower side of a band; its sides and its middle, its area, and the halves of that.
@@ -64,7 +64,7 @@ class TimelinePainter:
             painter.setPen(QColor(theme.FAINT))
             painter.drawText(self.view.rect(), Qt.AlignmentFlag.AlignCenter, texts.NOTHING_OPEN)
             return
-        strip_alone = part.top() >= RULER and part.bottom() < RULER + STRIP
+        strip_alone = part.top() >= RULER and part.bottom() < RULER + self.places.strip
         if strip_alone:
             self.strip.paint(painter)
             self._paint_playhead(painter)
@@ -357,6 +357,9 @@ class TimelinePainter:
         bar, at = QRectF(28, y + 3, GUTTER - 36, 3), QRectF(26, y - 13, GUTTER - 34, 15)
         if tall < at.height() + bar.height():
             bar, at = QRectF(28, y - 1, 14, 3), QRectF(26, y - 7.5, GUTTER - 34, 15)
+            font = painter.font()
+            font.setPixelSize(min(painter.fontInfo().pixelSize(), int(tall)))
+            painter.setFont(font)
         painter.fillRect(bar, QColor(theme.LINE))
         share = float(np.clip(weight, 0, 1))
         painter.fillRect(
@@ -397,7 +400,7 @@ class TimelinePainter:
             painter.setFont(paint.small_font(self.view, bold=True))
             wide = painter.fontMetrics().horizontalAdvance(text) / 2 + 4
             x = min(max(at.x(), GUTTER + wide), self.places.width - wide)
-            y = max(at.y() - 18, RULER + STRIP + 8.0)
+            y = max(at.y() - 18, RULER + self.places.strip + 8.0)
             paint.label(painter, x, y, text, style.BRIGHT, style.INK)
         if self.box is not None:
             painter.setPen(paint.pen(style.BRIGHT, 1.0, [3, 3]))

@@ -19,6 +19,8 @@ from palette4d.studio.session import Session
 
 #: The column of colours at the left, the ruler, the frame strip, and the zoom bar, in pixels.
 GUTTER, RULER, STRIP, FOOT = 84, 24, 46, 12
+#: Below this height of the timeline its rows have the strip's place.
+NO_STRIP = 220
 #: The height of a pick's range, that of more than two above each other, and the most of these.
 LANE, THIN_LANE, MOST_LANES = 13, 7, 5
 #: Space for the block names above the rows, below them, and beside the first and last frame.
@@ -103,6 +105,11 @@ class Places:
         return self._size()[1]
 
     @property
+    def strip(self) -> int:
+        """The height of the frame strip."""
+        return STRIP if self.height >= NO_STRIP else 0
+
+    @property
     def rows(self) -> Rows | None:
         """The rows of the palette."""
         return None if self.content is None or self._palette is None else self._palette[2]
@@ -176,7 +183,7 @@ class Places:
     def upper(self) -> float:
         """The y below the frame strip and the ranges of the picks."""
         lanes = self._lane_count
-        return RULER + STRIP + (lanes * self.lane_height + 4 if lanes else 0)
+        return RULER + self.strip + (lanes * self.lane_height + 4 if lanes else 0)
 
     @property
     def _lane_count(self) -> int:
@@ -186,7 +193,7 @@ class Places:
     def lane_height(self) -> int:
         """The height of a pick's range."""
         count = 0 if self.content is None or self._palette is None else self._palette[2].count
-        left = self.height - RULER - STRIP - HEAD - TAIL - FOOT - self._lane_count * LANE
+        left = self.height - RULER - self.strip - HEAD - TAIL - FOOT - self._lane_count * LANE
         return LANE if self._lane_count <= 2 or left >= count * ROOMY else THIN_LANE
 
     @property
@@ -224,7 +231,7 @@ class Places:
 
     def lane_y(self, lane: int) -> float:
         """Return the middle of a lane."""
-        return RULER + STRIP + 4 + (lane + 0.5) * self.lane_height
+        return RULER + self.strip + 4 + (lane + 0.5) * self.lane_height
 
     def _hit_lane(self, at: QPointF) -> Hit:
         """Return the pick at a point, and which end of its range or of its fades."""
@@ -270,7 +277,7 @@ class Places:
 
     def hit(self, at: QPointF) -> Hit:
         """Return what is at a point."""
-        if at.y() < RULER + STRIP:
+        if at.y() < RULER + self.strip:
             return Hit("ruler")
         if at.y() < self.upper:
             return self._hit_lane(at)

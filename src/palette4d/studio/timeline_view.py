@@ -123,7 +123,7 @@ class TimelineView(QWidget):
 
     def minimumSizeHint(self) -> QSize:
         """Return the least size: a few rows."""
-        return QSize(360, RULER + STRIP + FOOT + int(HEAD + TAIL) + 3 * int(LOWEST))
+        return QSize(360, RULER + FOOT + int(HEAD + TAIL) + 3 * int(LOWEST))
 
     @property
     def settled(self) -> bool:
@@ -152,7 +152,7 @@ class TimelineView(QWidget):
             self._strip_changed()
 
     def _strip_changed(self) -> None:
-        self.update(0, RULER, self.width(), STRIP)
+        self.update(0, RULER, self.width(), self.places.strip)
 
     def _frame_moved(self) -> None:
         places = self.places
@@ -198,7 +198,7 @@ class TimelineView(QWidget):
         steps, sideways = turn.y() / 120, turn.x() / 120
         keys, at = event.modifiers(), event.position()
         start, end = self.places.span
-        zooms = keys & Qt.KeyboardModifier.ControlModifier or at.y() < RULER + STRIP
+        zooms = keys & Qt.KeyboardModifier.ControlModifier or at.y() < RULER + self.places.strip
         if keys & Qt.KeyboardModifier.AltModifier:  # some systems turn the wheel sideways then
             self.make_taller(TALLER ** ((steps + sideways) / 2))
         elif keys & Qt.KeyboardModifier.ShiftModifier or sideways:

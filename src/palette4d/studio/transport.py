@@ -202,7 +202,7 @@ class Transport(QWidget):
         both.addLayout(looks, 1)
         for each in (both, row, looks):
             each.setSpacing(3)
-        self._rows = both
+        self._rows, self._parts = both, (row, looks)
         self.buttons: dict[str, QToolButton] = {}
         for name in ("first_frame", "previous_frame", "play", "next_frame", "last_frame"):
             button = QToolButton()
@@ -246,7 +246,7 @@ class Transport(QWidget):
         )
         self.look.setMinimumContentsLength(8)
         self.look.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-        self.look.setMinimumWidth(90)
+        self.look.setMinimumWidth(66)
         self.look.setMaximumWidth(230)
         self.look.setAccessibleName(texts.DISPLAY)
         self.look.activated.connect(self._chosen)
@@ -272,13 +272,15 @@ class Transport(QWidget):
         return QSize(LEAST_WIDTH, super().minimumSizeHint().height())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Take two rows where one has no room; leave out what has none in them."""
+        """Leave out what has no room; take two rows where that is not enough."""
         one, two = QBoxLayout.Direction.LeftToRight, QBoxLayout.Direction.TopToBottom
-        for direction, least in ((one, 0), (one, 1), (two, 0), (two, 1), (two, 2), (two, 3)):
+        for direction, least in (*((one, k) for k in range(4)), *((two, k) for k in range(4))):
             self._rows.setDirection(direction)
             for k, extra in enumerate(self.extras):
                 for widget in extra:
                     widget.setVisible(k >= least)
+            for part in self._parts:
+                part.invalidate()  # Qt does it only for the layout around them
             if self._rows.minimumSize().width() <= self.width():
                 break
         # Its layout asks for nothing: the bar does, or it would lie over the picture.
@@ -291,7 +293,7 @@ class Transport(QWidget):
         label = QLabel(text)
         label.setStyleSheet(f"color: {theme.FAINT}")
         row.addWidget(label)
-        box = Number(text, low, high, step, 2, 54)
+        box = Number(text, low, high, step, 2, 50)
         box.setAlignment(Qt.AlignmentFlag.AlignRight)
         box.setFont(theme.numbers_font())
         box.valueChanged.connect(lambda value: self.session.look(**{name: value}))

@@ -32,17 +32,28 @@ if TYPE_CHECKING:
 
 #: From this zoom on pixels are squares.
 SQUARES = 2.0
+#: The least height of the view in which the probe lists weights.
+LEAST_HEIGHT = 300
 #: The most weights that the probe lists, and a name as wide as their longest one.
 WEIGHTS, WIDEST_NAME = 4, "v12 greyish teal"
 
 
 class ViewerPainter:
-    """Draws a viewer."""
+    """Draws a viewer.
+
+    Attributes
+    ----------
+    plates : list of QRectF
+        Where words lie over the picture: the names of marks, and the legend.
+    probe : QRectF
+        Where the probe was drawn.
+    """
 
     def __init__(self, viewer: "Viewer") -> None:
         """Draw nothing yet."""
         self.viewer, self.session = viewer, viewer.session
-        self._corner = 0  # of the probe
+        self.plates: list[QRectF] = []
+        self.probe = QRectF()
 
     def paint(self) -> None:
         """Draw all."""
@@ -70,6 +81,7 @@ class ViewerPainter:
             self._draw_wipe(painter)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         self._draw_captions(painter)
+        self.plates.clear()
         self._draw_marks(painter)
         self.viewer.handles.paint(painter)
         self._draw_brush(painter)
@@ -82,8 +94,8 @@ class ViewerPainter:
             painter.setBrush(Qt.BrushStyle.NoBrush)
             frame = QRectF(self.viewer.press, self.viewer.pointer).normalized()
             paint.ring(painter, lambda: painter.drawRect(frame))
-        self._draw_probe(painter)
         self._draw_legend(painter)
+        self._draw_probe(painter)
         if self.viewer.late:
             text = texts.LATE.format(shown=self.viewer.shown_frame, frame=self.session.frame)
             _label(painter, text, QRectF(self.viewer.rect()), Qt.AlignmentFlag.AlignHCenter)
@@ -167,7 +179,7 @@ class ViewerPainter:
         if place is not None and place.frame == session.frame and not made:
             box = self._mark(painter, place.x, place.y, place.box, hold=False, cross=True)
             inspected = np.array([place.colour, place.colour])
-            _flag(painter, box, texts.NEW_PICK, on_screen(session, inspected), bright=True)
+            self._flag(painter, box, texts.NEW_PICK, on_screen(session, inspected), bright=True)
         for pick in () if session.document is None else session.document.grade.picks:
             if pick.pixel is None or pick.frame != session.frame:
                 continue
@@ -175,7 +187,7 @@ class ViewerPainter:
             box = self._mark(painter, x, y, pick.box or 1, hold=pick.kind == "hold")
             both = np.array([pick.rgb, pick.rgb if pick.to is None else pick.to])
             chosen = pick.id in session.selection
-            _flag(painter, box, pick.id, on_screen(session, both), bright=chosen)
+            self._flag(painter, box, pick.id, on_screen(session, both), bright=chosen)
         if session.picked is not None:
             self._draw_areas(painter, session.picked)
 
@@ -190,13 +202,13 @@ class ViewerPainter:
             if found is not None and note.window is not None and found.frame == session.frame:
                 corner = self.viewer.handles.paint_proposed(painter, note.window)
                 none = np.zeros((0, 3), np.uint8)
-                _flag(painter, corner, texts.PROPOSED_WINDOW, none, bright=False)
+                self._flag(painter, corner, texts.PROPOSED_WINDOW, none, bright=False)
             if place is None or place.frame != session.frame:
                 continue
             box = self._mark(painter, *place.pixel, place.box, hold=True, dashed=True)
             text = {"": texts.ALSO, "hold": texts.PROPOSED_HOLD, "area": texts.PROPOSED_BOX}
             shown = on_screen(session, np.array([place.rgb]))
-            _flag(painter, box, text[note.gesture], shown, bright=False)
+            self._flag(painter, box, text[note.gesture], shown, bright=False)
 
     def _draw_brush(self, painter: QPainter) -> None:
         """Draw the stroke, and the brush at the pointer."""
@@ -258,6 +270,48 @@ class ViewerPainter:
                 paint.ring(painter, functools.partial(painter.drawLine, start, end))
         return box
 
+    def _flag(
+        self,
+        painter: QPainter,
+        box: QRectF,
+        text: str,
+        colours: NDArray[np.uint8],
+        *,
+        bright: bool,
+    ) -> None:
+        """Write a name on a plate beside a mark, with its colours, where no other plate lies."""
+        font = painter.font()
+        font.setPointSizeF(8.5)
+        font.setBold(bright)
+        painter.setFont(font)
+        measure = QFontMetricsF(font)
+        tall = measure.height() + 4
+        left = 9 + 11 * len(colours)
+        wide = left + measure.horizontalAdvance(text) + 5
+        right, top = box.right() + 5, box.top() - 2
+        places = [(right, top), (box.left() - 5 - wide, top)]
+        places += [(right, y) for y in (box.bottom() + 2, top - tall)]
+        plate = self._free([QRectF(x, y, wide, tall) for x, y in places])
+        self.plates.append(plate)
+        painter.setPen(QPen(QColor(255, 255, 255, 230) if bright else QColor(0, 0, 0, 0), 1))
+        painter.setBrush(QColor(18, 18, 18, 215))
+        painter.drawRoundedRect(plate, 3, 3)
+        for k, rgb in enumerate(colours.tolist()):
+            square = QRectF(plate.left() + 5 + 11 * k, plate.top() + 3, 11, tall - 6)
+            painter.fillRect(square, QColor(*rgb))
+        painter.setPen(QColor(255, 255, 255))
+        painter.drawText(QPointF(plate.left() + left, plate.top() + 2 + measure.ascent()), text)
+
+    def _free(self, boxes: list[QRectF]) -> QRectF:
+        """Return the box with the least out of sight and below plates, the first of equals."""
+        sight = QRectF(self.viewer.rect())
+
+        def lost(box: QRectF) -> float:
+            covered = sum(_area(box & plate) for plate in self.plates)
+            return _area(box) - _area(box & sight) + covered
+
+        return min(boxes, key=lost)
+
     def _draw_probe(self, painter: QPainter) -> None:
         """Write what the pixel under the pointer is, in a corner that the pointer is not in."""
         probe = self.session.probe
@@ -269,22 +323,25 @@ class ViewerPainter:
         rows = [f"{probe.x}, {probe.y}"]
         rows.append(f"{texts.PROBE_IN:<4}" + " ".join(_figure(v) for v in probe.source))
         rows.append(f"{texts.PROBE_OUT:<4}" + " ".join(_figure(v) for v in probe.result))
-        shares = sorted(probe.weights.items(), key=lambda item: -abs(item[1]))[:WEIGHTS]
+        # In a low picture they would cover it; they stand beside the rows too.
+        weights = probe.weights if self.viewer.height() >= LEAST_HEIGHT else {}
+        shares = sorted(weights.items(), key=lambda item: -abs(item[1]))[:WEIGHTS]
         shares = [(id_, share) for id_, share in shares if abs(share) >= 0.005]
         line = measure.height() + 1
         width = max(measure.horizontalAdvance("in  " + " -0.0000" * len(probe.source)), 150.0)
-        named = measure.horizontalAdvance(WIDEST_NAME) if probe.weights else 0.0
-        width = max(width, named + 110.0)
+        named = measure.horizontalAdvance(WIDEST_NAME) if weights else 0.0
+        width = max(width, named + 110.0 if weights else 0.0)
         # As tall as it can become: it stays as it is while the pointer moves.
-        height = line * (len(rows) + (WEIGHTS if probe.weights else 0))
+        height = line * (len(rows) + (WEIGHTS if weights else 0))
         size = QSizeF(width + 16, height + 14)
         low = self.viewer.height() - size.height() - 12
-        corners = [QRectF(QPointF(self.viewer.width() - size.width() - 12, low), size)]
-        corners.append(QRectF(QPointF(12, low), size))
-        at = self.viewer.pointer
-        if at is not None and corners[self._corner].adjusted(-40, -40, 40, 40).contains(at):
-            self._corner = 1 - self._corner
-        box = corners[self._corner]
+        right = self.viewer.width() - size.width() - 12
+        corners = [QRectF(QPointF(x, y), size) for y in (low, 12) for x in (right, 12)]
+        at = self.viewer.pointer or QPointF(-99, -99)
+        away = [box for box in corners if not box.adjusted(-40, -40, 40, 40).contains(at)]
+        # It stays where it is as long as it can.
+        away.sort(key=lambda box: box != self.probe)
+        self.probe = box = self._free(away or corners)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(18, 18, 18, 225))
         painter.drawRoundedRect(box, 4, 4)
@@ -329,6 +386,7 @@ class ViewerPainter:
         tall = measure.height() + 8
         box = QRectF(12, 0, sum(widths) + wide + 36 if picture.matte else widths[0] + 16, tall)
         box.moveTop(self.viewer.height() - tall - 12)
+        self.plates.append(box)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(18, 18, 18, 225))
         painter.drawRoundedRect(box, 4, 4)
@@ -384,31 +442,12 @@ def hatched(mask: NDArray[np.uint8]) -> QImage:
     return paint.image_of(overlay, QImage.Format.Format_RGBA8888_Premultiplied)
 
 
+def _area(box: QRectF) -> float:
+    return box.width() * box.height()
+
+
 def _figure(value: float) -> str:
     return f"{value:7.4f}" if abs(value) < 100 else f"{value:7.1f}"
-
-
-def _flag(
-    painter: QPainter, box: QRectF, text: str, colours: NDArray[np.uint8], *, bright: bool
-) -> None:
-    """Write a name on a plate beside a mark, with its colours."""
-    font = painter.font()
-    font.setPointSizeF(8.5)
-    font.setBold(bright)
-    painter.setFont(font)
-    measure = QFontMetricsF(font)
-    tall = measure.height() + 4
-    left = 9 + 11 * len(colours)
-    wide = left + measure.horizontalAdvance(text) + 5
-    plate = QRectF(box.right() + 5, box.top() - 2, wide, tall)
-    painter.setPen(QPen(QColor(255, 255, 255, 230) if bright else QColor(0, 0, 0, 0), 1))
-    painter.setBrush(QColor(18, 18, 18, 215))
-    painter.drawRoundedRect(plate, 3, 3)
-    for k, rgb in enumerate(colours.tolist()):
-        square = QRectF(plate.left() + 5 + 11 * k, plate.top() + 3, 11, tall - 6)
-        painter.fillRect(square, QColor(*rgb))
-    painter.setPen(QColor(255, 255, 255))
-    painter.drawText(QPointF(plate.left() + left, plate.top() + 2 + measure.ascent()), text)
 
 
 def _label(painter: QPainter, text: str, box: QRectF, side: Qt.AlignmentFlag) -> None:

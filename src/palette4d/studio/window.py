@@ -20,6 +20,7 @@ from PySide6.QtGui import (
     QDropEvent,
     QKeyEvent,
     QKeySequence,
+    QResizeEvent,
 )
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -29,6 +30,7 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QMainWindow,
     QMessageBox,
+    QTabBar,
     QVBoxLayout,
     QWidget,
 )
@@ -61,6 +63,10 @@ from palette4d.studio.verb_menu import VerbMenu
 from palette4d.studio.versions_gallery import Gallery
 from palette4d.studio.viewer import Viewer
 
+#: Below this height the solid and the scopes are tabs beside the inspector.
+LOW = 800
+#: The layouts in the settings, of high windows and of low ones.
+STATES = {False: "state", True: "low_state"}
 #: Milliseconds between two looks at the file.
 TICK = 100
 #: Milliseconds for which the playhead rests before its frame is kept for *Reopen*.
@@ -104,6 +110,8 @@ class Window(QMainWindow):
         column.addWidget(self.viewer, 1)
         column.addWidget(self.transport)
         self.setCentralWidget(middle)
+        self._low = False  #: whether panels are folded
+        self._states: dict[bool, QByteArray] = {}  #: the layouts for both, as they were left
         self._make_docks()
         self._make_fields()
         self.line = StatusLine(session, self.viewer)
@@ -235,6 +243,8 @@ class Window(QMainWindow):
         """Give the panels their first places and sizes; the shots stay as they are."""
         shots = self.docks["shots"].isVisible()
         self.restoreState(self._first_state)
+        self._states.clear()
+        self._low = False
         self.arrange()
         self.docks["shots"].setVisible(shots)
 
@@ -248,29 +258,50 @@ class Window(QMainWindow):
             dock.hide()
 
     def arrange(self) -> None:
-        """Give the panels their usual sizes."""
+        """Give the panels their usual places and sizes."""
+        self._fold()
         width, height = self.width(), self.height()
-        side = min(max(330, width // 5), 460)
+        side = min(max(330, width * 6 // 25), 460)
         both = Qt.Orientation
-        self.resizeDocks(
-            [self.docks["solid"], self.docks["inspector"]], [side] * 2, both.Horizontal
-        )
-        solid = min(max(164, height * 3 // 10), side)
-        self.resizeDocks(
-            [self.docks["solid"], self.docks["inspector"]],
-            [solid, max(200, height - solid)],
-            both.Vertical,
-        )
-        low = max(height * 32 // 100, min(330, height * 2 // 5))
-        self.resizeDocks([self.docks["timeline"]], [low], both.Vertical)
+        self.resizeDocks([self.docks["inspector"]], [side], both.Horizontal)
+        if not self._low:
+            solid = min(height // 4, side)
+            panels = [self.docks["solid"], self.docks["inspector"]]
+            self.resizeDocks(panels, [solid, height - solid], both.Vertical)
+        self.resizeDocks([self.docks["timeline"]], [max(200, height * 32 // 100)], both.Vertical)
+
+    def _fold(self) -> None:
+        """Let the solid and the scopes share the inspector's place in a low window."""
+        low = self.height() < LOW
+        if low == self._low:
+            return
+        self._states[self._low] = self.saveState()
+        self._low = low
+        if low in self._states:
+            self.restoreState(self._states[low])
+            return
+        for name in ("solid", "scopes"):
+            self.tabifyDockWidget(self.docks["versions"], self.docks[name])
+        for bar in self.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly):
+            bar.hide()  # Qt shows those again that it goes on to use
+        self.docks["inspector"].raise_()
+        self.arrange()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Fold panels where they have no room, and unfold them where they have."""
+        super().resizeEvent(event)
+        self._fold()
 
     def restore(self) -> None:
         """Have the size and the panels as they were left; the shots come with a show."""
-        geometry, state = (self.settings.value(name) for name in ("geometry", "state"))
+        geometry = self.settings.value("geometry")
         if isinstance(geometry, QByteArray):
             self.restoreGeometry(geometry)
-        if isinstance(state, QByteArray):
-            self.restoreState(state)
+        self._fold()
+        for low, name in STATES.items():
+            if isinstance(state := self.settings.value(name), QByteArray):
+                self._states[low] = state
+        self.restoreState(self._states.get(self._low, QByteArray()))
         self.docks["shots"].hide()
 
     def _dock(self, title: str, view: QWidget, area: Qt.DockWidgetArea) -> QDockWidget:
@@ -448,7 +479,9 @@ class Window(QMainWindow):
                 return
         self.files.mark_open(None)
         self.settings.setValue("geometry", self.saveGeometry())
-        self.settings.setValue("state", self.saveState())
+        self._states[self._low] = self.saveState()
+        for low, state in self._states.items():
+            self.settings.setValue(STATES[low], state)
         self.shut()
         event.accept()
 
