@@ -201,6 +201,25 @@ def test_a_new_range_is_followed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert window.feather == 3
 
 
+def test_a_range_of_which_all_is_known_is_not_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = moving(monkeypatch)
+    document.pick(0, pixel=(20, 30), box=9, to="#2040b0", window=BOX, feather=3)
+    before, read = document.grade.pick("p1"), list[int]()
+
+    def change(**changes: float | None) -> Pick:
+        read.clear()
+        return document.change_pick("p1", progress=lambda done, _: read.append(done), **changes)
+
+    for changes in ({"start": 1, "until": 3}, {"fade": 1}, {"start": None, "until": 4}):
+        pick = change(**changes)
+        assert (pick.path, pick.window) == (before.path, before.window)
+        assert not read
+    document.undo()
+    document.change_pick("p1", follow=True)  # its range is shorter now
+    assert change(until=None).path[-1].frame == 5
+    assert read
+
+
 def test_the_feather_changes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     document = moving(monkeypatch)
     document.pick(0, pixel=(20, 30), box=9, to="#2040b0")

@@ -201,6 +201,6 @@ def test_after_a_crash_the_sidecar_is_offered_again(
     assert window.session.frame == 3
     assert not said(window)
     window.close()
-    assert frames_of(kept) == {}
+    assert frames_of(kept) == {str(sidecar): 3}
     window.files.offer_crashed()
     assert not said(window)

@@ -16,6 +16,7 @@ from windows import Settle, drop
 
 from palette4d.cli.main import main
 from palette4d.shows import manifest
+from palette4d.studio.session import Session
 from palette4d.studio.window import Window
 
 
@@ -189,3 +190,13 @@ def test_the_root_folder_is_no_clip(window: Window) -> None:
 def test_of_many_recent_files_the_newest_are_listed(window: Window) -> None:
     window.settings.setValue("recent", [f"{k}.p4d.json" for k in range(20_000)])
     assert window.files.recent_files() == [f"{k}.p4d.json" for k in range(10)]
+
+
+def test_a_file_opens_at_the_frame_where_it_was_left(opened: Window, sidecar: Path) -> None:
+    opened.session.go(9)
+    opened.close()
+    again = Window(Session(), opened.settings)
+    again.open_path(str(sidecar))
+    assert again.session.frame == 9
+    again.shut()
+    again.deleteLater()

@@ -261,13 +261,38 @@ def test_the_answer_says_what_a_pick_takes(qtbot: Any, opened: Window) -> None:
     expected = session.document.answer("p1", session.clip.source)
     assert session.answer == expected
     assert expected is not None
-    assert percent(expected.share) in panel.takes.words.text()
+    assert percent(expected.share).replace(" ", "\u00a0") in panel.takes.words.text()
     assert [line.isVisibleTo(panel) for line in panel.notes] == [
         k < len(expected.notes) for k in range(len(panel.notes))
     ]
     session.select()
     assert session.answer is None
     assert not panel.isVisibleTo(opened)
+
+
+def test_an_answer_says_that_its_frame_is_out_of_the_range(qtbot: Any, opened: Window) -> None:
+    pick(qtbot, opened, 40, 30)
+    session, words = opened.session, opened.inspector.panel.takes.words
+    qtbot.waitUntil(lambda: session.answer is not None, timeout=20_000)
+    assert texts.JUDGED not in words.text()
+    session.edit(lambda document: document.change_pick("p1", start=9))
+    qtbot.waitUntil(lambda: texts.JUDGED in words.text(), timeout=20_000)
+    assert "frame 6" in words.text()
+
+
+def test_a_range_within_a_known_path_follows_nothing(qtbot: Any, opened: Window) -> None:
+    pick(qtbot, opened, 40, 30)
+    session, said = opened.session, list[str]()
+    assert session.document is not None
+    path = session.document.grade.pick("p1").path
+    session.on("status", lambda: said.append(session.status.text))
+    grade_steps.set_range(session, "p1", 3, 8)
+    qtbot.waitUntil(lambda: not session.following, timeout=20_000)
+    grade_steps.set_fades(session, "p1", 2, 2)
+    qtbot.waitUntil(lambda: not session.following, timeout=20_000)
+    assert session.document.grade.pick("p1").path == path
+    assert session.document.grade.pick("p1").fades == (2, 2)
+    assert not [text for text in said if "of 12 frames" in text]
 
 
 def test_the_answers_buttons_do_what_it_proposes(qtbot: Any, opened: Window, sidecar: Path) -> None:

@@ -53,3 +53,16 @@ def test_a_new_stop_has_the_playhead(opened: Window) -> None:
     opened.session.go(12)
     opened._do("go_to_selected")
     assert opened.session.frame == frame
+
+
+def test_bars_keep_the_lists_order_whatever_their_ranges_are(opened: Window) -> None:
+    session = opened.session
+    for k, start in enumerate((7, 3, None)):
+        colour = (0.2 + 0.2 * k, 0.5, 0.4)
+        session.edit(
+            lambda document, colour=colour, start=start: document.pick(
+                8, colour=colour, by=(0.1, 0, 0), follow=False, start=start
+            )
+        )
+    placed = [(pick.id, lane) for pick, lane in opened.timeline.places.lanes()]
+    assert placed == [("p1", 0), ("p2", 1), ("p3", 2)]

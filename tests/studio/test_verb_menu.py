@@ -296,3 +296,23 @@ def test_where_media_are_read_only_another_place_is_proposed(
     dialog.start()
     qtbot.waitUntil(lambda: dialog not in window.verbs.dialogs, timeout=120_000)
     assert window.session.path == out
+
+
+def test_a_sequence_is_rendered_to_a_sequence_and_the_version_is_named(
+    opened: Window, sidecar: Path, qtbot: Any
+) -> None:
+    dialog = opened.verbs.render()
+    assert dialog.windowTitle() == "Render the grade"
+    out = sidecar.with_name("clip_graded") / "frame.####.png"
+    assert dialog.value("-o") == str(out)
+    frames = dialog.entry("--frames")
+    assert isinstance(frames, QLineEdit)
+    assert "1-12x2" in frames.placeholderText()
+    dialog.close()
+    opened.action("save_version")()
+    dialog = opened.verbs.render()
+    assert dialog.go.text() == "Render version A"
+    enter(dialog, "--frames", "1-12x4")
+    dialog.start()
+    qtbot.waitUntil(lambda: len([*out.parent.glob("frame.*.png")]) == 3, timeout=60_000)
+    qtbot.waitUntil(lambda: dialog.job is None, timeout=60_000)

@@ -396,3 +396,22 @@ def test_a_frame_that_does_not_decode_is_a_message(
     window.session.go(7)
     settle(window)
     assert not window.viewer.problem
+
+
+@pytest.mark.parametrize("x", [8, 80, 150])
+def test_the_probe_covers_no_plate(opened: Window, settle: Settle, x: int) -> None:
+    opened.resize(800, 500)
+    opened.session.edit(
+        lambda document: document.pick(6, pixel=(120, 70), to="#2040b0", follow=False)
+    )
+    settle(opened)
+    at = opened.viewer.point_of(x + 0.5, 45.5).toPoint()
+    QTest.mouseMove(opened.viewer, at)
+    QTest.mouseClick(opened.viewer, Qt.MouseButton.LeftButton, pos=at)
+    settle(opened)
+    opened.viewer.grab()
+    painter = opened.viewer.painter
+    assert len(painter.plates) >= 2
+    assert painter.probe.height() > 0
+    for plate in painter.plates:
+        assert not plate.intersects(painter.probe)

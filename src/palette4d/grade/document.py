@@ -404,10 +404,11 @@ class Document:
     def change_pick(self, id: str, *, clip: OfClip | None = None, **changes: Any) -> Pick:
         """Change a pick or hold: any of the attributes of `Pick` but id, kind, path and matte.
 
-        `by` gives the new colour as offsets from the picked colour. A new `frame`, `rgb` or range
-        is followed again, if the pick was followed; so is its window, in a new range. `follow`
-        begins or ends that. `feather` is the window's. Where its place or a hold changes, mattes
-        are learned again. `any_value` and `progress` are those of `pick`.
+        `by` gives the new colour as offsets from the picked colour. A new `frame` or `rgb` is
+        followed again, if the pick was followed. In a new range the path and the window are
+        followed again, unless they are known in all of it. `follow` begins or ends that. `feather`
+        is the window's. Where its place or a hold changes, mattes are learned again. `any_value`
+        and `progress` are those of `pick`.
         """
         self._take(pick_edits.change_pick(self.grade, self._clip(clip), id, **changes))
         return self.grade.pick(id)

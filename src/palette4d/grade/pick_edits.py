@@ -20,6 +20,7 @@ from palette4d.grade.mattes import Learned, odds_of
 from palette4d.grade.picks import (
     MOST_PICKS,
     Area,
+    PathKey,
     Pick,
     Toward,
     Window,
@@ -279,17 +280,18 @@ def change_pick(
         _check_room(grade)
     grade.check_frame(new.frame)
     check(new, grade.frames)
-    moved = {"frame", "rgb", "start", "until", "fade", "fade_out"} & changes.keys()
+    ranged = {"start", "until", "fade", "fade_out"} & changes.keys()
+    moved = ranged | {"frame", "rgb"} & changes.keys()
+    known = moved == ranged and _known(old.path, new, grade)
     if follow is False:
         new = replace(new, path=())
-    elif follow or (moved and old.path):
+    elif follow or (moved and old.path and not known):
         given = tuple(key for key in old.path if key.given and key.frame != old.frame)
         new = replace(new, path=clip.path(new, given, progress))
     if (window := new.window) is not None and "window" not in changes:
-        ranged = {"start", "until", "fade", "fade_out"} & changes.keys()
         if follow is False:
             new = replace(new, window=window.given)
-        elif follow or (ranged and window != window.given):
+        elif follow or (ranged and window != window.given and not _known(window.keys, new, grade)):
             new = _window_followed(clip, new, progress)
     label = f"change {id}: {_changed(old, new)}"
     if old.enabled != new.enabled:
@@ -298,6 +300,13 @@ def change_pick(
     if learns or follow is not None or old.enabled != new.enabled:
         return _learned(grade, clip, new, label)
     return grade.put("pick", id, new, label)
+
+
+def _known(keys: Sequence[PathKey] | Sequence[WindowKey], pick: Pick, grade: Grade) -> bool:
+    """Return whether keys that were followed reach through all frames that a pick changes."""
+    (first, last), step = pick.span(grade.frames), grade.frames[2]
+    followed = any(not key.given for key in keys)
+    return followed and keys[0].frame < first + step and last - step < keys[-1].frame
 
 
 def unpick(grade: Grade, clip: ClipOfPicks, *ids: str) -> Grade:

@@ -19,8 +19,8 @@ from palette4d.studio.start_page import is_there
 if TYPE_CHECKING:
     from palette4d.studio.window import Window
 
-#: Recent files that the menu keeps.
-RECENT = 10
+#: Recent files that the menu keeps, and files whose frames are kept: a show has many shots.
+RECENT, KEPT = 10, 100
 
 
 class FileMenu:
@@ -52,18 +52,25 @@ class FileMenu:
         if is_timeline(path):
             self.window.verbs.analyze_show(path)
         elif found.name.endswith(".json"):
-            self.session.open_sidecar(found, clip)
+            self._open_sidecar(found, clip)
             self._offer_recovery(found)
         else:
             beside_it = sidecar_of(path)
             if beside_it is not None:
-                self.session.open_sidecar(beside_it, path)
+                self._open_sidecar(beside_it, path)
             else:
                 self.session.open_clip(path)
                 self.window.verbs.analyze()
         self.remember(path)
         if not self.window.shots.follow():
             shots.hide()
+
+    def _open_sidecar(self, path: Path, clip: str | None = None) -> None:
+        """Open a sidecar at the frame at which it was left."""
+        frame = self._frames().get(str(path.absolute()))
+        self.session.open_sidecar(path, clip)
+        if frame is not None:
+            self.session.go(frame)
 
     def _offer_recovery(self, path: Path) -> None:
         copy = recovered(path)
@@ -82,17 +89,15 @@ class FileMenu:
             self.mark_frame()
 
     def mark_frame(self) -> None:
-        """Keep where the playhead is too."""
+        """Keep where the playhead is too, for the files that were open last."""
         if self._marked:
-            self.window.settings.setValue(
-                "frames", {**self._frames(), self._marked: self.session.frame}
-            )
+            frames = {path: at for path, at in self._frames().items() if path != self._marked}
+            kept = [*frames.items(), (self._marked, self.session.frame)][-KEPT:]
+            self.window.settings.setValue("frames", dict(kept))
             self.window.settings.sync()
 
     def _mark(self, opened: list[str]) -> None:
-        frames = {path: at for path, at in self._frames().items() if path in opened}
         self.window.settings.setValue("open", opened)
-        self.window.settings.setValue("frames", frames)
         self.window.settings.sync()
 
     def _frames(self) -> dict[str, int]:
@@ -104,18 +109,12 @@ class FileMenu:
         """Offer to open again what was open in a window that ended without closing."""
         marked = [each for each in self._listed("open") if each != self._marked]
         alive = [each for each in marked if is_open(each)]
-        frames = self._frames()
         self._mark([*alive, *([self._marked] if self._marked else [])])
         lost = next((each for each in marked if each not in alive and is_there(each)), None)
         if lost is not None:
             text = texts.CRASHED.format(name=Path(lost).name)
-            reopens = {texts.REOPEN: lambda: self._reopen(lost, frames.get(lost))}
+            reopens = {texts.REOPEN: lambda: self.open_path(lost)}
             self.window.banner.tell("crash", text, "warning", reopens)
-
-    def _reopen(self, path: str, frame: int | None) -> None:
-        self.open_path(path)
-        if frame is not None:
-            self.session.go(frame)
 
     def _listed(self, name: str) -> list[str]:
         found: Any = self.window.settings.value(name, [])
@@ -125,7 +124,7 @@ class FileMenu:
     def open_shot(self, path: Path) -> None:
         """Open a shot of the list."""
         try:
-            self.session.open_sidecar(path)
+            self._open_sidecar(path)
         except (Palette4dError, OSError) as error:
             self.session.report(error)
 

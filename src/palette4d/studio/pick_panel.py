@@ -76,7 +76,7 @@ class Line(QWidget):
 
     def say(self, words: str, colour: U8 | None = None) -> None:
         """Show words with a displayed colour; without words, hide."""
-        self.words.setText(words)
+        self.words.setText(words.replace(" %", "\u00a0%"))
         self.swatch.setVisible(colour is not None)
         if colour is not None:
             self.swatch.setPixmap(_patch(self, colour))
@@ -350,6 +350,8 @@ class PickPanel(QWidget):
         if found is not None and pick is not None:
             says = texts.TAKES if pick.kind == "pick" else texts.KEEPS
             words = says.format(share=percent(found.share), frame=found.frame)
+            if not grade_steps.acts_at(self.session, pick, found.frame):
+                words = f"{words} {texts.JUDGED}"
             frame, share = self._here or (found.frame, 0.0)
             if frame == self.session.frame != found.frame:
                 acts = grade_steps.acts_at(self.session, pick, frame)

@@ -98,7 +98,12 @@ class ScopesPainter:
         head = QRectF(box.left() + 6, box.top(), box.width() - 12, HEAD)
         painter.setPen(QColor(theme.FAINT))
         left = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(head, left, texts.SCOPES_SHOWN[name])
+        # Beside the name of a side its own name has no room in a small scope.
+        title = texts.SCOPES_SHOWN[name]
+        part = head.width() / (len(sides) if head.width() > box.height() else 1)
+        words = [title, *(self.names[side] for side in sides)][: 2 if len(sides) > 1 else 1]
+        if painter.fontMetrics().horizontalAdvance(" ".join(words)) <= part:
+            painter.drawText(head, left, title)
         inner = box.adjusted(6, HEAD, -6, -6)
         draws = {"waveform": self._waveform, "parade": self._parade, "histogram": self._histogram}
         if name == "vectorscope":

@@ -203,19 +203,16 @@ class Places:
         return LOW_HEAD if content is None or len(content.sections) < 2 else HEAD
 
     def lanes(self) -> list[tuple[Pick, int]]:
-        """Return the picks and holds with the lanes of their ranges; ranges of a lane are apart."""
+        """Return the picks and holds with the lanes of their ranges, in the list's order.
+
+        Each has a lane of its own; those beyond the last lane share it.
+        """
         document = self.session.document
         if document is None:
             return []
         if self._lanes is None or self._lanes[0] != self.session.revision:
-            ends: list[float] = []
-            placed = []
-            for pick in sorted(document.grade.picks, key=lambda pick: self.reach(pick)[0]):
-                start, *_, end = self.reach(pick)
-                free = [lane for lane, last in enumerate(ends) if last < start]
-                lane = free[0] if free else min(len(ends), MOST_LANES - 1)
-                ends[lane : lane + 1] = [end]
-                placed.append((pick, lane))
+            picks = enumerate(document.grade.picks)
+            placed = [(pick, min(k, MOST_LANES - 1)) for k, pick in picks]
             self._lanes = self.session.revision, placed
         return self._lanes[1]
 

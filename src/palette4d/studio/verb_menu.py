@@ -11,6 +11,8 @@ from PySide6.QtWidgets import QCheckBox, QFileDialog, QLineEdit
 from palette4d import _core
 from palette4d.analysis.options import METHODS
 from palette4d.common.errors import Palette4dError
+from palette4d.media import clip_sequence
+from palette4d.media.frame_writer import FORMATS
 from palette4d.shows.manifest import ENDING
 from palette4d.studio import texts
 from palette4d.studio.former import Former
@@ -171,7 +173,7 @@ class VerbMenu:
             [
                 Field("", texts.CLIP, "open", clip, hint=texts.CLIP_HINT),
                 Field("-o", texts.SIDECAR, "save", out),
-                Field("--frames", hint=texts.FRAMES_HINT, more=again),
+                Field("--frames", hint=texts.FRAMES_HINT.format(1001, 1100), more=again),
                 self._input_space(),
                 Field(
                     "", texts.EDITS, "choice", edits, EDITS, names=texts.EDITS_NAMES, more=not again
@@ -246,12 +248,24 @@ class VerbMenu:
             marks = own  # the palette is for these alone
         compared = ("", "wipe", "side")
         bits = ("", "8", "10", "16", "32")
+        out = self._beside("_graded.mp4")
+        if clip is not None and not clip.is_movie and len(clip.frames) > 1:
+            kind = clip_sequence.extension(clip.file(clip.frames[0]))
+            name = f"frame.####.{kind if kind in FORMATS else 'png'}"
+            out = str(Path(self._beside("_graded")) / name)
+        document = self.session.document
+        used = () if document is None else document.grade.same_edits
+        what = texts.A_VERSION.format(name=", ".join(used)) if used else texts.THE_GRADE
         return self._from_sidecar(
-            texts.RENDER,
+            f"{texts.RENDER} {what}",
             "render",
             Field("", texts.CLIP, "open", self._clip_source),
-            Field("-o", texts.OUTPUT, "save", self._beside("_graded.mp4")),
-            Field("--frames", value="{}-{}".format(*marks) if marks else ""),
+            Field("-o", texts.OUTPUT, "save", out),
+            Field(
+                "--frames",
+                value="{}-{}".format(*marks) if marks else "",
+                hint=texts.FRAMES_HINT.format(*own),
+            ),
             Field("--compare", texts.COMPARE_LABEL, "choice", "", compared, texts.NO_COMPARE),
             Field("--codec", "", "choice", "", CODECS, texts.CODEC_HINT, more=True),
             Field("--crf", hint=texts.CRF_HINT, more=True),

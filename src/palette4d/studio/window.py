@@ -477,6 +477,7 @@ class Window(QMainWindow):
             if not self.session.saved and asks.clickedButton() != discard:
                 event.ignore()
                 return
+        self.files.mark_frame()
         self.files.mark_open(None)
         self.settings.setValue("geometry", self.saveGeometry())
         self._states[self._low] = self.saveState()
