@@ -92,12 +92,12 @@ class Inspector(QWidget):
         whole.setContentsMargins(0, 0, 0, 0)
         whole.setSpacing(0)
         whole.addWidget(scrolled(content), UPPER)
-        self.lower = QWidget()
-        below = QVBoxLayout(self.lower)
-        below.setContentsMargins(10, 4, 10, 8)
-        below.addWidget(self.picks, 1)
-        below.addWidget(self.panel, 1)
-        whole.addWidget(self.lower, LOWER)
+        self.below = QWidget()
+        lists = QVBoxLayout(self.below)
+        lists.setContentsMargins(10, 4, 10, 8)
+        lists.addWidget(self.picks, 1)
+        lists.addWidget(self.panel, 1)
+        whole.addWidget(self.below, LOWER)
 
     def _make_head(self) -> QHBoxLayout:
         row = QHBoxLayout()
@@ -142,9 +142,9 @@ class Inspector(QWidget):
         self.ramp.setMinimumContentsLength(8)
         self.ramp.setAccessibleName(texts.RAMP)
         self.ramp.setToolTip(texts.RAMP_TIP)
-        self.ramp.addItem(texts.RAMP_OF_CLIP, None)
+        self.ramp.addItem(f"{texts.RAMP}: {texts.RAMP_OF_CLIP}", None)
         for ramp in RAMPS:
-            self.ramp.addItem(texts.RAMPS[ramp], ramp)
+            self.ramp.addItem(f"{texts.RAMP}: {texts.RAMPS[ramp]}", ramp)
         self.ramp.activated.connect(self._ramp_chosen)
         row.addSpacing(6)
         row.addWidget(self.ramp)
@@ -241,7 +241,7 @@ class Inspector(QWidget):
             self._show_words(len(session.selection))
             self._show_ramp()
         self._show_colour(targets[1:])
-        self.lower.setVisible(not self.picks.isHidden() or not self.panel.isHidden())
+        self.below.setVisible(not self.picks.isHidden() or not self.panel.isHidden())
 
     def _show_words(self, count: int) -> None:
         target = self.target
