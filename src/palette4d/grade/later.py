@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from palette4d.grade import edits
+from palette4d.grade import edits, pick_edits
 from palette4d.grade.clip_of_picks import DIGITS, ClipOfPicks
 from palette4d.grade.document import Document, OfClip
 from palette4d.grade.edits import Change, Colour, Edit, Key, State
@@ -138,13 +138,16 @@ def do_again(document: Document, step: Edit, clip: OfClip, progress: Progress | 
     with document.one_step(step.label):
         document.grade = document.grade.after(step)
         for pick in readers(step, document.grade):
+            old = were.get(pick.id)
             new = were.get(pick.id, pick) is None
             reads: dict[str, Any] = {"areas": pick.areas, "clip": clip, "progress": progress}
             if new and pick.pixel is not None:  # its colour too is read with it
                 reads |= {"pixel": pick.pixel, "box": pick.box}
-            if pick.id in were and (new or pick.path):
+            moved = old and (old.frame, old.rgb) != (pick.frame, pick.rgb)
+            stays = not moved and pick_edits.known(pick.path, pick, document.grade)
+            if pick.id in were and (new or (pick.path and not stays)):
                 reads["follow"] = True
-            window, old = pick.window, were.get(pick.id)
+            window = pick.window
             if window is not None and old is not None:
                 reads["window"] = window
             document.change_pick(pick.id, **reads)

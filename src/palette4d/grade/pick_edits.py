@@ -282,16 +282,16 @@ def change_pick(
     check(new, grade.frames)
     ranged = {"start", "until", "fade", "fade_out"} & changes.keys()
     moved = ranged | {"frame", "rgb"} & changes.keys()
-    known = moved == ranged and _known(old.path, new, grade)
+    stays = moved == ranged and known(old.path, new, grade)
     if follow is False:
         new = replace(new, path=())
-    elif follow or (moved and old.path and not known):
+    elif follow or (moved and old.path and not stays):
         given = tuple(key for key in old.path if key.given and key.frame != old.frame)
         new = replace(new, path=clip.path(new, given, progress))
     if (window := new.window) is not None and "window" not in changes:
         if follow is False:
             new = replace(new, window=window.given)
-        elif follow or (ranged and window != window.given and not _known(window.keys, new, grade)):
+        elif follow or (ranged and window != window.given and not known(window.keys, new, grade)):
             new = _window_followed(clip, new, progress)
     label = f"change {id}: {_changed(old, new)}"
     if old.enabled != new.enabled:
@@ -302,7 +302,7 @@ def change_pick(
     return grade.put("pick", id, new, label)
 
 
-def _known(keys: Sequence[PathKey] | Sequence[WindowKey], pick: Pick, grade: Grade) -> bool:
+def known(keys: Sequence[PathKey] | Sequence[WindowKey], pick: Pick, grade: Grade) -> bool:
     """Return whether keys that were followed reach through all frames that a pick changes."""
     (first, last), step = pick.span(grade.frames), grade.frames[2]
     followed = any(not key.given for key in keys)
