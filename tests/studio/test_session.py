@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import time
 from collections.abc import Generator
 from pathlib import Path
 from types import SimpleNamespace
@@ -208,6 +209,23 @@ def test_what_an_earlier_session_could_not_save_stays(
     assert not later.save()
     assert palette4d.load(copy).grade.colour(id_) == (1.0, 0.0, 0.0)
     sidecar.write_bytes(whole)
+
+
+def test_edits_are_offered_again_though_the_disk_has_a_clock_of_its_own(
+    session: Session, sidecar: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The file server's is ten minutes ahead; once the sidecar is written again they are not."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    id_, whole, saved = vertex(sidecar), sidecar.read_bytes(), time.time() + 600
+    sidecar.write_text("{")
+    os.utime(sidecar, (saved, saved))
+    session.edit(lambda document: document.set(id_, rgb=(1.0, 0.0, 0.0)))
+    assert not session.save()
+    sidecar.write_bytes(whole)
+    os.utime(sidecar, (saved, saved))
+    assert recovered(sidecar) == next(recovery_files(sidecar))
+    os.utime(sidecar, (saved + 1, saved + 1))
+    assert recovered(sidecar) is None
 
 
 def test_saved_in_another_folder_the_sidecar_finds_its_clip(

@@ -436,6 +436,9 @@ class Session(Drafts):
             copy.parent.mkdir(parents=True, exist_ok=True)
             self._elsewhere(self._document).save(copy, on_edits="drop")
             self._copy = copy
+            with contextlib.suppress(OSError):  # it may be gone
+                times = self._document.path.stat()
+                os.utime(copy, ns=(times.st_atime_ns, times.st_mtime_ns))
             kept = texts.KEPT_IN.format(copy=copy)
         except (Palette4dError, OSError):
             kept = texts.KEPT_HERE
@@ -499,10 +502,13 @@ def recovery_files(sidecar: Path) -> Iterator[Path]:
 
 
 def recovered(sidecar: Path) -> Path | None:
-    """Return the newest edits of a sidecar that could not be saved, if they are newer than it."""
+    """Return the newest edits of a sidecar that could not be saved, if it is as it was then.
+
+    A copy has the time of the sidecar that could not be written, whose disk may have its own clock.
+    """
     kept = [*itertools.takewhile(Path.exists, recovery_files(sidecar))]
-    newest = max(kept, key=lambda path: path.stat().st_mtime, default=None)
-    if newest is None or newest.stat().st_mtime < sidecar.stat().st_mtime:
+    newest = max(reversed(kept), key=lambda path: path.stat().st_mtime_ns, default=None)
+    if newest is None or newest.stat().st_mtime_ns < sidecar.stat().st_mtime_ns:
         return None
     return newest
 
