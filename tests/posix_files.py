@@ -1,6 +1,8 @@
 """Marks of tests about what files are on Linux and macOS, and not on Windows; deep folders."""
 
+import contextlib
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -20,6 +22,21 @@ gifts = pytest.mark.skipif(
     reason="only root may give a file to another user",
 )
 folders = pytest.mark.skipif(_WINDOWS, reason="Windows opens no folders as files")
+
+
+@contextlib.contextmanager
+def as_user(user: int, group: int | None = None) -> Iterator[None]:
+    """Be another user, of no further groups; for root alone."""
+    groups = os.getgroups()
+    os.setgroups([])
+    os.setegid(user if group is None else group)
+    os.seteuid(user)
+    try:
+        yield
+    finally:
+        os.seteuid(0)
+        os.setegid(0)
+        os.setgroups(groups)
 
 
 def make_deep(path: Path, levels: int) -> None:

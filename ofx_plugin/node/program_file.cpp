@@ -168,11 +168,18 @@ std::string changeable_base(const fs::path& program) {
         bytes_of(program.parent_path().parent_path() / "pyvenv.cfg", kMaxProgramBytes);
     std::istringstream lines(settings.value_or(""));
     for (std::string line; std::getline(lines, line);) {
+        // As Python reads it: blanks around both count for nothing, nor does the key's case.
+        const auto trimmed = [](const std::string& text) {
+            constexpr const char* kBlanks = " \t\r\n\v\f";
+            const std::size_t from = text.find_first_not_of(kBlanks);
+            if (from == std::string::npos) return std::string();
+            return text.substr(from, text.find_last_not_of(kBlanks) - from + 1);
+        };
         const std::size_t sign = line.find('=');
-        if (line.substr(0, line.find_first_of(" =")) != "home" || sign == std::string::npos)
-            continue;
-        const std::size_t from = line.find_first_not_of(' ', sign + 1);
-        const fs::path home = from == std::string::npos ? "" : line.substr(from);
+        std::string key = trimmed(line.substr(0, sign));
+        for (char& c : key) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+        if (key != "home" || sign == std::string::npos) continue;
+        const fs::path home = trimmed(line.substr(sign + 1));
         if (home.is_absolute()) return changeable_program(home);
     }
     return "";

@@ -1,6 +1,5 @@
 """The atomic writer: whatever happens, a reader finds the old file or the new one."""
 
-import contextlib
 import errno
 import os
 import secrets
@@ -17,7 +16,7 @@ from pathlib import Path, PureWindowsPath
 import access_lists
 import pytest
 from access_lists import NOBODY, for_one
-from posix_files import folders, gifts, links, locks, make_deep, modes, pipes
+from posix_files import as_user, folders, gifts, links, locks, make_deep, modes, pipes
 
 from palette4d.colour.ocio_config import config_of_sidecar
 from palette4d.common import files, locking
@@ -226,20 +225,6 @@ def test_a_group_that_is_kept_out_stays_out(how: str) -> None:
             file.read_bytes()
         with as_user(888):
             assert file.read_bytes() == b"new"
-
-
-@contextlib.contextmanager
-def as_user(user: int, group: int | None = None) -> Iterator[None]:
-    groups = os.getgroups()
-    os.setgroups([])
-    os.setegid(user if group is None else group)
-    os.seteuid(user)
-    try:
-        yield
-    finally:
-        os.seteuid(0)
-        os.setegid(0)
-        os.setgroups(groups)
 
 
 @gifts

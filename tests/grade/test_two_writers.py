@@ -6,11 +6,13 @@ import os
 import stat
 import subprocess
 import sys
+import tempfile
 import time
 import uuid
 from pathlib import Path
 
 import pytest
+from posix_files import as_user, gifts
 
 from palette4d.common import locking
 from palette4d.common.errors import Palette4dError
@@ -55,6 +57,8 @@ for i in range(int(count)):
 print(json.dumps([acknowledged, refused]))
 """
 LOCKS = ("flock", "refused", "useless")
+#: What a program of this computer that has ended leaves in its lock.
+DEAD = locking._computer() + f" {2**22 + 1} {'0' * 16}"
 
 
 def children(path: Path, count: int, locks: tuple[str, ...]) -> tuple[list[list[object]], int]:
@@ -214,6 +218,41 @@ def test_a_lock_that_was_taken_away_stops_the_write(tmp_path: Path) -> None:
         with pytest.raises(Palette4dError):
             held()
     assert (tmp_path / ".clip.p4d.json.lock").read_text() == "another 1 abc"
+
+
+@gifts
+@pytest.mark.parametrize("left", ["dead", "unfinished"])
+def test_a_left_over_lock_that_may_not_be_removed_is_an_error(
+    monkeypatch: pytest.MonkeyPatch, left: str
+) -> None:
+    """Of a colleague's program, in a folder where each may remove his own files alone."""
+    monkeypatch.setattr(locking, "LOCK_SECONDS", 0.3)
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder).chmod(0o1777)
+        path = Path(folder, "shot.p4d.json")
+        lock = path.with_name(f".{path.name}.lock")
+        lock.write_text(DEAD if left == "dead" else "")
+        os.utime(lock, (0, 0))
+        refused = pytest.raises(Palette4dError, match="remove that file")
+        with as_user(777), refused, locking.locked(path):
+            pass
+        with locking.locked(path):  # its owner may
+            pass
+
+
+def test_a_removal_of_the_future_holds_nobody_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A program was killed in it, and the clock was put back since."""
+    monkeypatch.setattr(locking, "LOCK_SECONDS", 0.3)
+    path = tmp_path / "shot.p4d.json"
+    path.with_name(f".{path.name}.lock").write_text(DEAD)
+    turn = path.with_name(f".{path.name}.lock.removing")
+    turn.touch()
+    os.utime(turn, (time.time() + 3600,) * 2)
+    with locking.locked(path):
+        pass
+    assert not [*tmp_path.iterdir()]
 
 
 @pytest.mark.parametrize("mask", [0, 0o077])

@@ -150,12 +150,14 @@ TEST(the_programs_file_is_believed_only_if_it_is_ours) {
         const fs::path made = folder() / "venv";
         fs::create_directories(made / "bin");
         fs::copy_file(place / "sh", made / "bin" / "python");
-        write("venv/pyvenv.cfg",
-              "include-system-site-packages = false\nhome = " + theirs.u8string());
         write("program", (made / "bin" / "python").u8string());
-        CHECK(read_program(file).problem.empty());
-        CHECK(::chown(theirs.c_str(), 12345, 12345) == 0);
-        refused("theirs belongs to another user");
+        for (const char* key : {"home = ", "home=", " HOME\t= "}) {
+            write("venv/pyvenv.cfg", "version = 3.11\n" + (key + theirs.u8string()) + " ");
+            CHECK(read_program(file).problem.empty());
+            CHECK(::chown(theirs.c_str(), 12345, 12345) == 0);
+            refused("theirs belongs to another user");
+            CHECK(::chown(theirs.c_str(), 0, 0) == 0);
+        }
         fs::remove_all(made);
         fs::remove_all(theirs);
         // A group of the user's own name is the user; another is not.

@@ -54,9 +54,10 @@ def locked(target: Path) -> Iterator[Callable[[], None]]:
     mine = f"{_computer()} {os.getpid()} {secrets.token_hex(8)}"
     while not _created(path, mine):
         owner = _content(path)
-        if owner is not None and (_is_dead(owner) or _is_unfinished(path, owner)):
-            _remove(path, owner)
-        elif time.monotonic() > deadline:
+        left_over = owner is not None and (_is_dead(owner) or _is_unfinished(path, owner))
+        if left_over and _remove(path, owner or ""):
+            continue
+        if time.monotonic() > deadline:
             if owner is None and not path.exists():
                 raise _cannot(path)
             raise Palette4dError(
@@ -64,8 +65,7 @@ def locked(target: Path) -> Iterator[Callable[[], None]]:
                 f"{LOCK_SECONDS:g} seconds; wait for it to finish. If it no longer runs, remove "
                 "that file"
             )
-        else:
-            time.sleep(random.uniform(0.002, 0.03))
+        time.sleep(random.uniform(0.002, 0.03))
 
     def held() -> None:
         if _content(path) != mine:
@@ -105,29 +105,28 @@ def _created(path: Path, content: str) -> bool:
         handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
     except FileExistsError:
         return False
-    except PermissionError:
-        if sys.platform == "win32":  # another program is just removing it
-            return False
-        raise _cannot(path) from None
-    except OSError:
-        raise _cannot(path) from None
+    except OSError as error:
+        if sys.platform == "win32" and isinstance(error, PermissionError):
+            return False  # another program is just removing it
+        raise _cannot(path, error.strerror) from None
     try:
         if sys.platform != "win32":  # whatever the umask: read by all, changed by its owner
             with contextlib.suppress(OSError):
                 os.fchmod(handle, 0o644)
         os.write(handle, content.encode())
-    except OSError:
+    except OSError as error:
         with contextlib.suppress(OSError):
             path.unlink(missing_ok=True)
-        raise _cannot(path) from None
+        raise _cannot(path, error.strerror) from None
     finally:
         os.close(handle)
     return True
 
 
-def _cannot(path: Path) -> Palette4dError:
+def _cannot(path: Path, reason: str | None = "unknown") -> Palette4dError:
     return Palette4dError(
-        f"{path}: the lock file cannot be created; choose another folder or change its permissions"
+        f"{path}: the lock file cannot be created ({reason}); choose another folder, or make this "
+        "one writable"
     )
 
 
@@ -176,20 +175,23 @@ def _is_unfinished(path: Path, owner: str) -> bool:
     return age > UNFINISHED_SECONDS and not _OWNER.fullmatch(owner)
 
 
-def _remove(path: Path, owner: str) -> None:
-    """Remove the lock file of an owner that died, and no other.
+def _remove(path: Path, owner: str) -> bool:
+    """Remove the lock file of an owner that died, and no other; return whether it is gone.
 
     One program at a time may: between the look and the removal another one could remove it too, and
     a third take the lock.
     """
     turn = path.with_name(f"{path.name}.removing")
     with contextlib.suppress(OSError):
-        if time.time() - turn.lstat().st_mtime > LOCK_SECONDS:  # of a program that was killed
+        # Of a program that was killed; one of the future is from before a clock was put back.
+        if abs(time.time() - turn.lstat().st_mtime) > LOCK_SECONDS:
             turn.unlink()
     with contextlib.suppress(OSError):
         os.close(os.open(turn, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
         try:
             if _content(path) == owner:
                 path.unlink()
+                return True
         finally:
             turn.unlink(missing_ok=True)
+    return False

@@ -150,10 +150,10 @@ def _refuse_others_program(bundle: Path) -> None:
     ask = [sys.executable, "-E", "-P", "-c", "import sys; print(*sys.path, sep='\\n')"]
     folders = subprocess.run(ask, check=True, stdout=subprocess.PIPE, encoding="utf-8").stdout
     above = (sys.executable, sys.prefix, sys.base_prefix, f"{sys.prefix}/pyvenv.cfg")
-    within = (*folders.splitlines(), Path(__file__).parents[1], bundle)
-    checks = [(changeable, Path(path)) for path in above]
-    checks += [(changeable_within, Path(path)) for path in within]
-    for check, path in checks:
+    within = (*folders.splitlines(), str(Path(__file__).parents[1]), str(bundle))
+    for text in (*above, *within):
+        path = Path(text)
+        check = changeable_within if text in within else changeable
         problem = check(path) if path.exists() else None
         if problem is not None:
             raise Palette4dError(
