@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from fractions import Fraction
 
 import av
@@ -12,7 +13,6 @@ from clip_files import damage, write_image, write_movie
 
 from palette4d.media import clip_movie
 from palette4d.media.clip import ClipError, FrameError, open_clip
-from palette4d.media.clip_movie import MovieClip
 
 HEIGHT, WIDTH = 48, 64
 
@@ -185,14 +185,14 @@ def test_a_jump_decodes_from_the_key_frame_before(tmp_path, monkeypatch):
         options={"g": "8"},
     )
     decoded = []
-    decode = MovieClip._decode
+    decode = clip_movie._decode
 
-    def counted(clip, start):
-        for number, picture in decode(clip, start):
+    def counted(*words):
+        for number, picture in decode(*words):
             decoded.append(number)
             yield number, picture
 
-    monkeypatch.setattr(MovieClip, "_decode", counted)
+    monkeypatch.setattr(clip_movie, "_decode", counted)
     clip = open_clip(str(path))
     for frame in (0, 44, 45):
         assert float(clip.read(frame).mean()) * 51 == pytest.approx(frame, abs=1)
@@ -209,6 +209,17 @@ def test_a_picture_of_any_width_is_decoded_alike_each_time(tmp_path, width):
     first = open_clip(str(path)).read(0)
     for _ in range(12):
         np.testing.assert_array_equal(open_clip(str(path)).read(0), first)
+
+
+def test_a_movie_is_let_go_at_once(tmp_path):
+    """Windows renames and replaces no file that is open."""
+    path = write_movie(tmp_path / "a.avi", "rawvideo", "bgr24", noise(6), "rgb24")
+    clip = open_clip(str(path))
+    clip.read(2)
+    gone = weakref.ref(clip)
+    del clip
+    assert gone() is None
+    path.rename(tmp_path / "b.avi")
 
 
 def test_variable_rate_is_noted(tmp_path):

@@ -66,7 +66,7 @@ class MovieClip(Clip):
     _decoder: Iterator[tuple[int, av.VideoFrame]] | None = field(default=None, init=False)
     _next: int = field(default=0, init=False)
     _held: tuple[int, av.VideoFrame] | None = field(default=None, init=False)
-    _problem: str = field(default="", init=False)
+    _problems: list[str] = field(default_factory=list, init=False)
 
     def file(self, frame: int) -> Path:
         """Return the movie file, which holds every frame."""
@@ -124,7 +124,7 @@ class MovieClip(Clip):
         if picture is not None and int(picture.colorspace) == UNKNOWN:
             picture.colorspace = self.matrix
         if picture is None:
-            why = f" ({self._problem})" if self._problem else ""
+            why = f" ({self._problems[-1]})" if self._problems else ""
             raise FrameError(
                 f"{self.path}: frame {frame} cannot be decoded{why}; expected {self.count} whole "
                 "frames.",
@@ -158,8 +158,9 @@ class MovieClip(Clip):
         return index >= 0 and self.key_frames[index] >= self._next + WORTH_SEEKING
 
     def _start(self, frame: int) -> None:
-        self._decoder = self._decode(frame)
-        self._next, self._held, self._problem = 0, None, ""
+        self._next, self._held, self._problems = 0, None, []
+        all_keys = len(self.key_frames) == self.count
+        self._decoder = _decode(self.path, self.stamps, frame, all_keys, self._problems)
 
     def _advance(self, frame: int) -> av.VideoFrame | None:
         """Decode up to a picture; a later picture is kept for the next call."""
@@ -174,51 +175,57 @@ class MovieClip(Clip):
         picture = self._held[1]
         self._held = None
         if picture.is_corrupt:
-            self._problem = "the decoder marks it as damaged"
+            self._problems.append("the decoder marks it as damaged")
             return None
         return picture
 
-    def _decode(self, start: int) -> Iterator[tuple[int, av.VideoFrame]]:
-        """(number, picture) from the key frame before `start`, or a little later."""
-        numbers = {stamp: index for index, stamp in enumerate(self.stamps or ())}
-        counted = 0
-        with opened_movie(self.path) as container:
-            stream = video_stream(container, self.path)
-            # Report a damaged picture instead of concealing the damage. FFmpeg's TIFF decoder also
-            # reports whole files, because of their Exif.
-            if stream.codec_context.name != "tiff":
-                stream.codec_context.options = {"err_detect": "crccheck+explode"}
-            stream.thread_type = "AUTO"
-            if start and len(self.key_frames) == self.count and _has_slices(stream):
-                stream.thread_type = "SLICE"  # frame threads would decode later pictures too
-            if start and self.stamps:
-                try:
-                    container.seek(self.stamps[start], stream=stream, backward=True)
-                except FFmpegError:
-                    container.seek(0)
-            for pictures in self._packets(container, stream):
-                for picture in pictures:
-                    if self.stamps is None:
-                        yield counted, picture
-                        counted += 1
-                    elif picture.pts in numbers:
-                        yield numbers[picture.pts], picture
 
-    def _packets(self, container: Any, stream: Any) -> Iterator[list[av.VideoFrame]]:
-        """Decoded pictures of each packet; damaged pictures are recorded and skipped."""
-        packets = container.demux(stream)
-        while True:
+# Not methods: a clip that is in its own decoder would keep the movie open after its last use, and
+# Windows replaces and renames no open file.
+def _decode(
+    path: Path, stamps: list[int] | None, start: int, all_keys: bool, problems: list[str]
+) -> Iterator[tuple[int, av.VideoFrame]]:
+    """(number, picture) from the key frame before `start`, or a little later."""
+    numbers = {stamp: index for index, stamp in enumerate(stamps or ())}
+    counted = 0
+    with opened_movie(path) as container:
+        stream = video_stream(container, path)
+        # Report a damaged picture instead of concealing the damage. FFmpeg's TIFF decoder also
+        # reports whole files, because of their Exif.
+        if stream.codec_context.name != "tiff":
+            stream.codec_context.options = {"err_detect": "crccheck+explode"}
+        stream.thread_type = "AUTO"
+        if start and all_keys and _has_slices(stream):
+            stream.thread_type = "SLICE"  # frame threads would decode later pictures too
+        if start and stamps:
             try:
-                packet = next(packets, None)
-                if packet is None:
-                    return
-            except FFmpegError as error:  # the file ends in the middle
-                self._problem = error.strerror or str(error)
+                container.seek(stamps[start], stream=stream, backward=True)
+            except FFmpegError:
+                container.seek(0)
+        for pictures in _packets(container, stream, problems):
+            for picture in pictures:
+                if stamps is None:
+                    yield counted, picture
+                    counted += 1
+                elif picture.pts in numbers:
+                    yield numbers[picture.pts], picture
+
+
+def _packets(container: Any, stream: Any, problems: list[str]) -> Iterator[list[av.VideoFrame]]:
+    """Decoded pictures of each packet; damaged pictures are recorded and skipped."""
+    packets = container.demux(stream)
+    while True:
+        try:
+            packet = next(packets, None)
+            if packet is None:
                 return
-            try:
-                yield packet.decode()
-            except FFmpegError as error:
-                self._problem = error.strerror or str(error)
+        except FFmpegError as error:  # the file ends in the middle
+            problems.append(error.strerror or str(error))
+            return
+        try:
+            yield packet.decode()
+        except FFmpegError as error:
+            problems.append(error.strerror or str(error))
 
 
 def open_movie(
