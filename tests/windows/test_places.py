@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import OpenImageIO as oiio
@@ -55,16 +56,18 @@ def test_small_pixels_get_large_windows(
 
 
 @pytest.fixture
-def as_user(folder: Path, tmp_path: Path) -> Run:
-    """A program of the folder, run by a user who may write nowhere but in a folder of his own."""
+def own() -> Iterator[Path]:
+    """A folder of another user; those of pytest are closed to him."""
     if os.geteuid() != 0:
         pytest.skip("only root may run programs as another user")
-    for place in (*tmp_path.parents, tmp_path):
-        if not place.stat().st_mode & 0o001:
-            place.chmod(place.stat().st_mode | 0o011)
-    own = tmp_path / "own"
-    own.mkdir()
-    os.chown(own, NOBODY, NOBODY)
+    with tempfile.TemporaryDirectory(prefix="palette4d-") as name:
+        os.chown(name, NOBODY, NOBODY)
+        yield Path(name)
+
+
+@pytest.fixture
+def as_user(folder: Path, own: Path) -> Run:
+    """A program of the folder, run by a user who may write nowhere but in a folder of his own."""
     environment = {
         **os.environ,
         "HOME": str(own),
@@ -87,9 +90,8 @@ def as_user(folder: Path, tmp_path: Path) -> Run:
     return run
 
 
-def test_a_user_without_rights(as_user: Run, folder: Path, tmp_path: Path) -> None:
+def test_a_user_without_rights(as_user: Run, folder: Path, own: Path) -> None:
     """An administrator unpacked the folder; he works in it, and gets the node for himself."""
-    own = tmp_path / "own"
     before = {path: path.stat().st_mtime for path in folder.rglob("*")}
     done = as_user("palette4d.exe", "sample-clip", "-o", "clip/f.####.png", "--frames", "4")
     assert done.returncode == 0, done.stdout
