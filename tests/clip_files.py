@@ -54,6 +54,8 @@ def write_image(
     target = oiio.ImageOutput.create(str(path))
     assert target is not None, oiio.geterror()
     assert target.open(str(path), spec), target.geterror()
+    if pixels.dtype == np.uint32:  # long on Windows, which OpenImageIO takes for 64 bits
+        pixels = pixels.view(np.uintc)
     assert target.write_image(np.ascontiguousarray(pixels)), target.geterror()
     assert target.close(), target.geterror()
     return path

@@ -38,7 +38,7 @@ class TestExport:
     ) -> None:
         assert export("--every", "10", "-o", tmp_path, "--name", "shot") == 0
         printed = capsys.readouterr()
-        assert f"3 files, {tmp_path}/shot.0000.cube to shot.0020.cube: 3 baked" in printed.out
+        assert f"3 files, {tmp_path / 'shot.0000.cube'} to shot.0020.cube: 3 baked" in printed.out
         assert "%|" not in printed.err  # a bar is for terminals alone
         assert "--clip" in printed.err
         assert export("--every", "10", "-o", tmp_path, "--name", "shot") == 0
@@ -149,10 +149,10 @@ class TestConfig:
         words = (*words, "--anyway", "--size", "9")
         assert config(*words, "--names", "shot010") == 0
         printed = capsys.readouterr()
-        assert printed.out.startswith(f"{show}/config.ocio: 1 look, added to ocio://")
+        assert printed.out.startswith(f"{show / 'config.ocio'}: 1 look, added to ocio://")
         assert "shot010  frames 0 to 20, 3 LUTs, " in printed.out
         assert "between the LUTs: deltaE 2000 of up to " in printed.out
-        assert f"OCIO={show}/config.ocio SHOT=shot010 FRAME=0" in printed.out
+        assert f"OCIO={show / 'config.ocio'} SHOT=shot010 FRAME=0" in printed.out
         assert config(*words, "--names", "shot010") == 1
         assert "--force" in capsys.readouterr().err
         assert config(*words, "--names", "shot010", "--force", "--json") == 0
