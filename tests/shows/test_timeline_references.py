@@ -6,6 +6,7 @@ import contextlib
 import copy
 import json
 import shutil
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -80,7 +81,8 @@ class TestReferences:
     def test_clips_name_their_files(
         self, show: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
-        assert export(show, "-o", "luts", "--otio", "graded/../graded.otio") == 1  # no such folder
+        if sys.platform != "win32":  # Windows never asks whether the folder before ".." is there
+            assert export(show, "-o", "luts", "--otio", "graded/../graded.otio") == 1
         assert export(show, "-o", "luts", "--otio", "graded.otio") == 0
         printed = capsys.readouterr()
         assert "graded.otio: references in 2 clips" in printed.out

@@ -20,7 +20,9 @@ collect_ignore_glob = [] if GIVEN else ["test_*.py"]
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
-def wine(program: str, *words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+def wine(
+    program: str, *words: str | Path, cwd: Path, timeout: int = 600
+) -> subprocess.CompletedProcess[str]:
     """Run a program of the folder; its output goes through a pipe, since Wine writes to no file."""
     environment = {
         "WINEPREFIX": str(Path(GIVEN) / "wine"),
@@ -39,7 +41,7 @@ def wine(program: str, *words: str | Path, cwd: Path) -> subprocess.CompletedPro
         stderr=subprocess.STDOUT,
         encoding="utf-8",
         errors="replace",
-        timeout=600,
+        timeout=timeout,
         check=False,
     )
 
@@ -69,7 +71,7 @@ def windows_pytest() -> Run:
     start = f"import sys; sys.path.append({tools!r}); import pytest; sys.exit(pytest.main())"
 
     def run(*words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-        return wine("python/python.exe", "-c", start, *words, cwd=cwd)
+        return wine("python/python.exe", "-c", start, *words, cwd=cwd, timeout=1700)
 
     return run
 

@@ -12,14 +12,20 @@ Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 # The page for releases says what is known of the others.
 ROOMS = (
+    "analysis",
     "bindings",
+    "cli",
     "colour",
     "common",
+    "grade",
     "hosts",
     "jobs/test_pool.py",
     "lut_export",
+    "media",
     "parity",
     "plotting",
+    *(f"shows/test_{name}.py" for name in ("edl", "find_media", "manifest", "shots", "show_cdls")),
+    "shows/test_timeline_references.py",
 )
 
 
