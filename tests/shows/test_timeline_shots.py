@@ -303,7 +303,7 @@ class TestMedia:
             clip("b", external("/vol/other/clip.mov"), 0, 5),
         )
         one, other = edit(made, tmp_path, tmp_path / "m").shots
-        assert one.clip.endswith("day2/clip.mov")
+        assert Path(one.clip).parts[-2:] == ("day2", "clip.mov")
         assert "found 2 media named 'clip.mov'" in other.problem
 
     def test_missing_media_is_a_problem_of_its_shot_alone(
@@ -316,7 +316,7 @@ class TestMedia:
             clip("take", external("plates/b/take.mov"), 0, 5),
         )
         gone, web, none, take = edit(made, tmp_path, plates).shots
-        assert "'/vol/gone.mov' is not there" in gone.problem
+        assert f"'{Path('/vol/gone.mov')}' is not there" in gone.problem
         assert "media=…" in gone.problem
         assert "expected a file" in web.problem
         assert "the edit names no file for it, and nothing under" in none.problem
@@ -342,7 +342,7 @@ class TestMedia:
     def test_a_path_of_another_computer_is_none_of_this_one(
         self, tmp_path: Path, plates: Path
     ) -> None:
-        here = (plates / "b" / "take.mov").as_posix()
+        here = (plates / "b" / "take.mov").as_uri().removeprefix("file://")
         one, other = edit(
             timeline(
                 clip("a", external(f"file://localhost{here}"), 0, 5),
@@ -350,7 +350,7 @@ class TestMedia:
             ),
             tmp_path,
         ).shots
-        assert one.clip == here
+        assert one.clip == str(plates / "b" / "take.mov")
         assert "another computer" in other.problem
 
     def test_no_such_folder(self, tmp_path: Path) -> None:

@@ -177,11 +177,11 @@ class _Finder:
             return spec
         if self.folder is not None and (there := self.folder.find(names)):
             return str(there)
-        what = f"{named!r} is not there" if named else "the edit names no file for it"
+        what = f"{_in_quotes(named)} is not there" if named else "the edit names no file for it"
         if self.folder is None:
             help_ = f"name the folder that holds it with {Arg('media')}"
         else:
-            looked = " or ".join(map(repr, names)) or "its name"
+            looked = " or ".join(map(_in_quotes, names)) or "its name"
             what += f", and nothing under {self.folder.path} is called {looked}"
             help_ = f"bring it there, or name another folder with {Arg('media')}"
         raise Palette4dError(f"the media is missing: {what}; {help_}")
@@ -271,6 +271,11 @@ class _Finder:
         if spec not in self.timecodes:
             self.timecodes[spec] = self.child.call(_timecode, spec)
         return self.timecodes[spec]
+
+
+def _in_quotes(name: str) -> str:
+    r"""Return a name with its special characters told, and Windows' backslashes as they are."""
+    return repr(name).replace(r"\\", "\\")
 
 
 def _name(clip: str) -> str:
