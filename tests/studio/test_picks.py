@@ -270,6 +270,22 @@ def test_the_answer_says_what_a_pick_takes(qtbot: Any, opened: Window) -> None:
     assert not panel.isVisibleTo(opened)
 
 
+def test_an_answer_goes_as_soon_as_its_pick_is_another_one(qtbot: Any, opened: Window) -> None:
+    """It was there until the pick was followed and measured, with a button that did it again."""
+    pick(qtbot, opened, 40, 30)
+    session, panel = opened.session, opened.inspector.panel
+    qtbot.waitUntil(lambda: session.answer is not None, timeout=20_000)
+    first = session.answer
+    shown = list[object]()
+    session.on("answer", lambda: shown.append(session.answer))
+    grade_steps.set_window(session, "p1", 6, (20, 10, 70, 50))
+    qtbot.waitUntil(lambda: bool(shown), timeout=20_000)
+    assert shown[0] is None
+    assert panel.takes.words.text() == texts.LOOKING
+    qtbot.waitUntil(lambda: session.answer is not None, timeout=20_000)
+    assert session.answer != first
+
+
 def test_an_answer_says_that_its_frame_is_out_of_the_range(qtbot: Any, opened: Window) -> None:
     pick(qtbot, opened, 40, 30)
     session, words = opened.session, opened.inspector.panel.takes.words

@@ -290,24 +290,23 @@ class PickPanel(QWidget):
             self._waits = self._known = None
             self._clear()
             return
-        if session.dragging or session.following:
-            return  # the session tells of the document again when that is done
         # What it takes depends on itself and on holds; its new colour changes nothing.
         own = [
             replace(p, to=None) for p in document.grade.picks if p.kind == "hold" or p.id == pick.id
         ]
         asked, trial = (document, source, own), Document(document.grade)
         known = session.answer if asked == self._known else None
+        if known is None and not session.dragging:
+            self._known = None
+            session.show_answer(None)
+            self._clear(texts.LOOKING)
+        if session.dragging or session.following:
+            return  # the session tells of the document again when that is done
         same = known is not None and self._revision == session.revision
         warned, self._revision, self._waits = self._warned, session.revision, asked
         frame, player = session.frame, session.player
         pixels = None if player is None else player.frame(frame)
         self._lacks = pixels is None
-        if known is None:
-            for line in self.notes:
-                line.button.setEnabled(False)
-        if session.answer is None:
-            self._clear(texts.LOOKING)
 
         def work() -> None:
             found, here, told = known, None, warned
@@ -339,6 +338,7 @@ class PickPanel(QWidget):
     def _clear(self, words: str = "") -> None:
         """Show no answer, but words instead of it."""
         for line in (*self.notes, self.warning):
+            line.button.clearFocus()  # as it goes: else the keyboard would go to the next one
             line.say("")
         self.takes.button.hide()
         self.takes.say(words)
