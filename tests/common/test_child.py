@@ -10,12 +10,10 @@ import pytest
 from child_calls import crash, fault, grow, hang, refuse, speak_to_the_tracker, take_over, well
 from confining import confines
 from farm_processes import running, wait_for
-from wine import WINE
+from wine import unlimited
 
 from palette4d.common.child import Child, ChildError
 from palette4d.common.errors import Palette4dError, SidecarError
-
-UNLIMITED = "Wine takes a job's limit of memory and does not keep it"
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +71,7 @@ def test_one_process_serves_many_calls(child: Child) -> None:
     ("call", "words"),
     [
         (crash, "crashed .SIGABRT" if sys.platform != "win32" else "crashed .exit status"),
-        pytest.param(grow, "more than 2048 MB", marks=pytest.mark.skipif(WINE, reason=UNLIMITED)),
+        pytest.param(grow, "more than 2048 MB", marks=unlimited),
     ],
 )
 def test_a_call_that_goes_wrong_costs_one_call(

@@ -29,6 +29,7 @@ from edits import (
 )
 from opentimelineio.opentime import RationalTime
 from posix_files import pipes
+from wine import unlimited
 from without_module import run_without
 
 from palette4d.common.errors import Palette4dError
@@ -471,6 +472,7 @@ class TestHostile:
         with pytest.raises(Palette4dError, match="cannot be read as a timeline"):
             timeline_clips.read(path)
 
+    @unlimited
     def test_an_archive_that_unpacks_to_too_much(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -510,7 +512,9 @@ class TestHostile:
         assert [bool(shot.problem) for shot in found] == [False, True, True, False]
         assert all(len(f"{shot.name}.p4d.json.0123") < 255 for shot in found)
 
-    @pytest.mark.parametrize(("limit", "least"), [("SECONDS", 0.0), ("MEGABYTES", 64)])
+    @pytest.mark.parametrize(
+        ("limit", "least"), [("SECONDS", 0.0), pytest.param("MEGABYTES", 64, marks=unlimited)]
+    )
     def test_media_that_exceeds_a_limit(
         self,
         limit: str,
