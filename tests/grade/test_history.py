@@ -18,6 +18,7 @@ from palette4d.grade.document import Document
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "sidecars"
 STOP = {"edge": "e1", "frame": 5, "rgb": [0, 0, 0]}
+AREA = {"frame": 2, "points": [[3, 10], [{}, 10]], "radius": 1.5}
 PICK = {"id": "p1", "kind": "pick", "frame": 5, "rgb": [0, 0, 0], "to": [1, 1, 1]}
 
 
@@ -145,6 +146,7 @@ def test_the_history_stays_small(plain: Path) -> None:
         {"done": [{"step": "x", "changes": [["handle", "s1", None, STOP | {"frame": "5"}]]}]},
         {"done": [{"step": "x", "changes": [["pick", "p1", None, {"id": "p1"}]]}]},
         {"done": [{"step": "x", "changes": [["pick", "p1", None, PICK | {"fade": "5"}]]}]},
+        {"done": [{"step": "x", "changes": [["pick", "p1", None, PICK | {"areas": [AREA]}]]}]},
         {"undone": [{"step": 3, "changes": [["lock", "v1", None, True]]}]},
         {"undone": [{"step": "x", "changes": [["lock", "v1", None, 3]]}]},
         {"done": [{"step": "x", "changes": [["lock", "v1", None, True]], "unread": 1}]},

@@ -200,7 +200,9 @@ def _pick(fields: Mapping[str, Any]) -> Pick:
             raise ValueError(f"found the {name} {fields[name]!r}, expected a number")
     if fields["kind"] not in ("pick", "hold") or fields["frame"] is None:
         raise ValueError(f"found the pick {fields['id']!r}, expected its kind and frame")
-    return Pick.from_fields(fields)
+    pick = Pick.from_fields(fields)
+    pick.to_fields()  # refuses other things in the place of numbers
+    return pick
 
 
 def _typed(value: Any, kind: type) -> Any:
