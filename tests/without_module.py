@@ -17,7 +17,7 @@ def run_without(module: str, folder: Path, *words: str) -> subprocess.CompletedP
     return subprocess.run(
         [sys.executable, "-c", program],
         capture_output=True,
-        text=True,
+        encoding="utf-8",  # as palette4d writes, also on Windows
         timeout=120,
         cwd=folder,
         check=False,
