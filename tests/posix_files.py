@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,6 +21,10 @@ homes = pytest.mark.skipif(_WINDOWS, reason="Windows tells a user's folders by n
 gifts = pytest.mark.skipif(
     not hasattr(os, "geteuid") or os.geteuid() != 0,
     reason="only root may give a file to another user",
+)
+lists = pytest.mark.skipif(
+    sys.platform != "linux" or os.geteuid() != 0,
+    reason="only root may be several users, and access lists are read as Linux stores them",
 )
 folders = pytest.mark.skipif(_WINDOWS, reason="Windows opens no folders as files")
 

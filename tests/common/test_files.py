@@ -16,7 +16,7 @@ from pathlib import Path, PureWindowsPath
 import access_lists
 import pytest
 from access_lists import NOBODY, for_one
-from posix_files import as_user, folders, gifts, links, locks, make_deep, modes, pipes
+from posix_files import as_user, folders, gifts, links, lists, locks, make_deep, modes, pipes
 
 from palette4d.colour.ocio_config import config_of_sidecar
 from palette4d.common import files, locking
@@ -153,9 +153,7 @@ def test_an_access_list_that_cannot_be_copied_gives_its_rights_to_nobody(
     assert stat.S_IMODE(old.stat().st_mode) == 0o600
 
 
-@pytest.mark.skipif(
-    sys.platform != "linux" or os.geteuid() != 0, reason="needs root, and Linux's attributes"
-)
+@lists
 @pytest.mark.parametrize("given", ["", "group"])
 @pytest.mark.parametrize("listed", [False, True])
 def test_who_cannot_give_the_file_away_names_its_owner_and_group(
@@ -186,9 +184,7 @@ def test_who_cannot_give_the_file_away_names_its_owner_and_group(
     assert sorted(access_lists.entries(old)) == sorted(expected)
 
 
-@pytest.mark.skipif(
-    sys.platform != "linux" or os.geteuid() != 0, reason="needs root, and Linux's attributes"
-)
+@lists
 def test_users_that_a_list_names_write_one_file_in_turn() -> None:
     with tempfile.TemporaryDirectory() as folder:  # pytest's are closed to other users
         Path(folder).chmod(0o777)
@@ -204,9 +200,7 @@ def test_users_that_a_list_names_write_one_file_in_turn() -> None:
             file.read_bytes()
 
 
-@pytest.mark.skipif(
-    sys.platform != "linux" or os.geteuid() != 0, reason="needs root, and Linux's attributes"
-)
+@lists
 @pytest.mark.parametrize("how", ["list", "mode"])
 def test_a_group_that_is_kept_out_stays_out(how: str) -> None:
     """A group with fewer rights than all others, by name in a list or as the file's group."""
@@ -237,9 +231,7 @@ def test_owner_and_group_are_kept(old: Path) -> None:
     assert sys.platform != "linux" or ACL not in os.listxattr(old)
 
 
-@pytest.mark.skipif(
-    sys.platform != "linux" or os.geteuid() != 0, reason="needs root, and Linux's attributes"
-)
+@lists
 def test_without_access_lists_the_rights_of_a_group_that_is_not_kept_go(
     old: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
