@@ -36,6 +36,16 @@ def test_recent_files_have_pictures_and_open(
     assert not page.isVisible()
 
 
+def test_a_clip_and_its_sidecar_are_one_work(window: Window, tmp_path: Path) -> None:
+    names = ("b.p4d.json", "a.mov", "a.p4d.json", "b.mov", "c.mov")
+    for name in names:
+        (tmp_path / name).touch()
+    window.settings.setValue("recent", [str(tmp_path / name) for name in names])
+    window.start.fill()
+    texts = [window.start.list.item(row).text() for row in range(window.start.list.count())]
+    assert [Path(text).name for text in texts] == ["b.p4d.json", "a.mov", "c.mov"]
+
+
 def test_pictures_of_all_shapes_have_one_size(qapp: Any) -> None:
     """What a smaller one does not cover of the blank one before it stayed on the screen."""
     for height, width in ((20, 60), (63, 30), (1, 1)):

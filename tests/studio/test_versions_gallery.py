@@ -93,7 +93,7 @@ def test_two_versions_are_compared_until_something_is_edited(
     assert opened.viewer.picture.request.grade is not None
 
 
-def test_the_buttons_name_what_is_compared_and_escape_shows_the_source_again(
+def test_the_buttons_name_what_is_compared_and_escape_shows_the_grade_again(
     gallery: Gallery, opened: Window
 ) -> None:
     recolour(opened, (0.1, 0.9, 0.1))
@@ -102,7 +102,8 @@ def test_the_buttons_name_what_is_compared_and_escape_shows_the_source_again(
     buttons = opened.transport.compare
     assert [buttons[side].text() for side in ("before", "after")] == ["A", "B"]
     opened._do("cancel")
-    assert (opened.session.view.version, opened.session.view.after) == ("", "")
+    view = opened.session.view
+    assert (view.version, view.after, view.compare) == ("", "", "after")
     assert [buttons[side].text() for side in ("before", "after")] == ["Before", "After"]
 
 

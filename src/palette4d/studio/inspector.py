@@ -50,7 +50,7 @@ U8 = NDArray[np.uint8]
 Scope = Literal["handle", "track", "palette"]
 
 #: The parts of the height that the colour has, and the lists below it.
-UPPER, LOWER = 11, 9
+UPPER, LOWER = 12, 8
 #: Colours of a bar.
 SAMPLES = 24
 
@@ -142,7 +142,7 @@ class Inspector(QWidget):
         self.ramp.setMinimumContentsLength(8)
         self.ramp.setAccessibleName(texts.RAMP)
         self.ramp.setToolTip(texts.RAMP_TIP)
-        self.ramp.addItem(f"{texts.RAMP}: {texts.RAMP_OF_CLIP}", None)
+        self.ramp.addItem(texts.RAMP_OF_CLIP, None)
         for ramp in RAMPS:
             self.ramp.addItem(f"{texts.RAMP}: {texts.RAMPS[ramp]}", ramp)
         self.ramp.activated.connect(self._ramp_chosen)

@@ -103,7 +103,7 @@ class MenuActions:
         elif self.window.isFullScreen():
             self.window.showNormal()
         elif self.session.view.version or self.session.view.after:
-            self.session.look(version="", after="")
+            self.session.look(version="", after="", compare="after")
             self.session.say(texts.COMPARED_SOURCE)
         else:
             self.session.select()

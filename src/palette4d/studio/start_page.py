@@ -101,7 +101,11 @@ class StartPage(QWidget):
         """List the recent files that are there; a thread draws their pictures."""
         self._generation += 1
         self.list.clear()
-        paths = [path for path in self._recent() if is_there(path)]
+        works: dict[str, str] = {}  # a clip and its sidecar are one
+        for path in self._recent():
+            if is_there(path):
+                works.setdefault(str(sidecar_beside(path) or path), path)
+        paths = [*works.values()]
         blank = QPixmap(THUMB)
         blank.fill(Qt.GlobalColor.black)
         for path in paths:
@@ -118,7 +122,7 @@ class StartPage(QWidget):
         for row, path in enumerate(paths):
             if generation != self._generation:
                 return
-            sidecar = Path(path) if path.endswith(".p4d.json") else sidecar_of(path)
+            sidecar = sidecar_beside(path)
             try:
                 pixels = None if sidecar is None else thumbnail(sidecar)
             except (Palette4dError, OSError):
@@ -129,6 +133,11 @@ class StartPage(QWidget):
     def _set(self, generation: int, row: int, pixels: U8) -> None:
         if generation == self._generation:
             self.list.item(row).setIcon(icon_of(pixels))
+
+
+def sidecar_beside(path: str) -> Path | None:
+    """Return the sidecar that a recent file is or has."""
+    return Path(path) if path.endswith(".p4d.json") else sidecar_of(path)
 
 
 def is_there(path: str) -> bool:

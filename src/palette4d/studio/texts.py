@@ -524,7 +524,7 @@ SCOPE_TIPS = {
 }
 RAMP = "Ramp"
 RAMP_TIP = "How the colour goes to the next handle; with nothing selected: the clip's default"
-RAMP_OF_CLIP = "as the clip"
+RAMP_OF_CLIP = "The clip's ramp"
 RAMPS = {"linear": "linear", "smooth": "smooth", "hold": "step"}
 RAMP_SET = "ramp: {ramp}"
 WHEEL = "Hue and chroma"
