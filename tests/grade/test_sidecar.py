@@ -205,8 +205,28 @@ def test_edits_are_not_lost_unasked(edited: Path) -> None:
     ):
         with pytest.raises(Palette4dError) as caught:
             attempt()
-        assert "2 edited vertices, 3 stops and 0 picks and holds" in str(caught.value)
+        assert "2 edited vertices, 3 stops, 0 picks and holds" in str(caught.value)
     assert edited.read_bytes() == before
+
+
+def test_versions_without_an_edit_are_kept_and_not_lost_unasked(tmp_path: Path) -> None:
+    path, other = tmp_path / "clip.p4d.json", tmp_path / "other.p4d.json"
+    for target in (path, other):
+        sidecar.save(golden("split"), target)
+    document = Document.load(path)
+    document.set("v1", rgb=(0.7, 0.2, 0.6))
+    document.save_version("warm")
+    document.undo()
+    document.save()
+    assert not document.grade.edited
+    before = path.read_bytes()
+    with pytest.raises(Palette4dError, match="1 version"):
+        Document.load(other).save(path)
+    assert path.read_bytes() == before
+    sidecar.save(golden("split"), path, on_edits="keep")
+    kept = Document.load(path)
+    assert kept.grade.versions == ("warm",)
+    assert kept.history.undone == document.history.undone
 
 
 def test_edits_are_dropped_on_request(edited: Path) -> None:

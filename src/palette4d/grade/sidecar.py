@@ -139,9 +139,9 @@ def save(
     path : path
         A symbolic link is followed; permissions of an existing file are kept.
     on_edits : {"refuse", "keep", "drop"}
-        What to do if the file exists and holds edits that `document` lacks. "keep" copies the edits
-        (and ``extra``). It needs the same polytope, because edits refer to its vertices and edges;
-        `grade.reanalysis` copies grades to another polytope.
+        What to do if the file exists and holds edits or versions that `document` lacks. "keep"
+        copies them (and the history, and ``extra``). It needs the same polytope, because edits
+        refer to its vertices and edges; `grade.reanalysis` copies grades to another polytope.
     replaces : bytes, optional
         The expected content of the file; another one is an error.
     """
@@ -149,11 +149,10 @@ def save(
     target = link_target(path)
     with locked(target) as held:
         old = existing(target, on_edits)
-        if old is not None and has_edits(old[1]) and old[1]["edits"] != members.get("edits"):
+        if old is not None and _lacks(members, old[1]):
             if on_edits == "refuse":
                 raise _would_lose(target, old[1])
-            if on_edits == "keep":
-                members = _with_edits_of(old[1], members, target)
+            members = _with_edits_of(old[1], members, target)
         core, data = _core.encode_sidecar(members, os.fspath(target))
         write(target, data, held, replaces=replaces)
     return core, members, data
@@ -216,11 +215,19 @@ def existing(target: Path, on_edits: OnEdits) -> Saved | None:
         ) from error
 
 
+def _lacks(document: Fields, old: Fields) -> bool:
+    """Return whether a document lacks edits or versions of an old one."""
+    versions = document.get("versions", ())
+    gone = any(version not in versions for version in old.get("versions", ()))
+    return gone or (has_edits(old) and old["edits"] != document.get("edits"))
+
+
 def _summary(document: Fields) -> str:
     vertices = counted(len(document["edits"]["vertices"]), "edited vertex", "edited vertices")
     stops = counted(len(document["edits"]["stops"]), "stop")
     picks = counted(len(document["edits"].get("picks", ())), "pick or hold", "picks and holds")
-    return f"{vertices}, {stops} and {picks}"
+    versions = counted(len(document.get("versions", ())), "version")
+    return f"{vertices}, {stops}, {picks}, {versions}"
 
 
 def _would_lose(target: Path, old: Fields) -> Palette4dError:
