@@ -13,6 +13,7 @@
 #include "fit/palette_loss.hpp"
 #include "fit/polytope_loss.hpp"
 #include "fit/progressive_hull.hpp"
+#include "unlocked.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;
@@ -61,7 +62,7 @@ void bind_analysis(py::module_& m) {
         .def(py::init([](const py::object& rgb, const py::object& counts) {
                  std::vector<Vec3> v = colours_from(rgb, "rgb");
                  std::vector<double> n = numbers_from(counts, "counts");
-                 py::gil_scoped_release release;
+                 const Unlocked unlocked;
                  return std::make_shared<ColourTree>(std::move(v), std::move(n));
              }),
              py::arg("rgb"), py::arg("counts"))
@@ -84,7 +85,7 @@ void bind_analysis(py::module_& m) {
             [](const ColourTree& t, const py::object& v, double k) {
                 std::vector<Vec3> colours = colours_from(v, "v");
                 {
-                    py::gil_scoped_release release;
+                    const Unlocked unlocked;
                     for (Vec3& x : colours) x = t.nearest_mean(x, k);
                 }
                 return to_array(colours);
@@ -113,7 +114,7 @@ void bind_analysis(py::module_& m) {
             std::vector<Vec3> gradient;
             FrameLoss loss;
             {
-                py::gil_scoped_release release;
+                const Unlocked unlocked;
                 loss = palette_loss(colours, v, f, weights, with_gradient ? &gradient : nullptr);
             }
             return py::make_tuple(loss.R, loss.C, shape_of(loss, weights), loss.outside,
@@ -150,7 +151,7 @@ void bind_analysis(py::module_& m) {
                 std::vector<Vec4> gradient;
                 std::vector<FrameLoss> losses;
                 {
-                    py::gil_scoped_release release;
+                    const Unlocked unlocked;
                     losses = polytope_loss(v, self.blocks, self.frames, which, weights, threads,
                                            with_gradient ? &gradient : nullptr);
                 }
@@ -186,7 +187,7 @@ void bind_analysis(py::module_& m) {
             const std::vector<Face> f = faces_from(faces);
             std::vector<Vec3> out;
             {
-                py::gil_scoped_release release;
+                const Unlocked unlocked;
                 out = progressive_hull(v, f, target);
             }
             return to_array(out);
@@ -214,7 +215,7 @@ void bind_analysis(py::module_& m) {
                                       most_nodes};
             ColourLinks out;
             {
-                py::gil_scoped_release release;
+                const Unlocked unlocked;
                 out = find_links(problem);
             }
             return py::make_tuple(out.links, out.broken, out.complete);

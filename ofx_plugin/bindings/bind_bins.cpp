@@ -14,6 +14,7 @@
 #include "binders.hpp"
 #include "fit/colour_bins.hpp"
 #include "fit/colour_tree.hpp"
+#include "unlocked.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;
@@ -50,17 +51,17 @@ void add_image(ColourBinner& self, const py::array& image, int bits, bool premul
     if (holds<std::uint8_t>(image)) {
         const auto packed = packed_rows<std::uint8_t>(image);
         const auto rows = rows_of(packed);
-        const py::gil_scoped_release release;
+        const Unlocked unlocked;
         self.add(rows, premultiplied);
     } else if (holds<std::uint16_t>(image)) {
         const auto packed = packed_rows<std::uint16_t>(image);
         const auto rows = rows_of(packed);
-        const py::gil_scoped_release release;
+        const Unlocked unlocked;
         self.add(rows, bits, premultiplied);
     } else if (holds<float>(image)) {
         const auto packed = packed_rows<float>(image);
         const auto rows = rows_of(packed);
-        const py::gil_scoped_release release;
+        const Unlocked unlocked;
         self.add(rows, premultiplied);
     } else {
         throw py::value_error("image: found dtype " + std::string(py::str(image.dtype())) +
@@ -74,7 +75,7 @@ void add_planes(ColourBinner& self, const py::array (&planes)[3], const LumaChro
                                            packed_rows<Sample>(planes[1]),
                                            packed_rows<Sample>(planes[2])};
     const Rows<Sample> rows[3] = {rows_of(packed[0]), rows_of(packed[1]), rows_of(packed[2])};
-    const py::gil_scoped_release release;
+    const Unlocked unlocked;
     self.add_luma_chroma(rows, how);
 }
 
@@ -123,7 +124,7 @@ py::object take_trees(ColourBinner& self, std::size_t colours, std::size_t coars
         throw py::value_error("expected a positive scale of the counts");
     Trees trees;
     {
-        const py::gil_scoped_release release;
+        const Unlocked unlocked;
         ColourBins fine = self.take(colours);
         if (!fine.rgb.empty()) trees = trees_of(std::move(fine), coarse, scale);
     }
@@ -137,7 +138,7 @@ py::object take_trees(ColourBinner& self, std::size_t colours, std::size_t coars
 void bind_bins(py::module_& m) {
     m.def("return_memory", [] {
 #ifdef __GLIBC__
-        py::gil_scoped_release release;
+        const Unlocked unlocked;
         malloc_trim(0);
 #endif
     });
@@ -154,7 +155,7 @@ void bind_bins(py::module_& m) {
             [](ColourBinner& self, const py::object& rgb, const py::object& counts) {
                 const std::vector<Vec3> v = colours_from(rgb, "rgb");
                 const std::vector<double> n = numbers_from(counts, "counts");
-                const py::gil_scoped_release release;
+                const Unlocked unlocked;
                 self.add_colours(v, n);
             },
             py::arg("rgb"), py::arg("counts"))

@@ -10,6 +10,7 @@
 #include "binders.hpp"
 #include "convert/colour_conversion.hpp"
 #include "sidecar/sidecar.hpp"
+#include "unlocked.hpp"
 
 using palette4d::ClipConversion;
 using palette4d::ColourConversion;
@@ -30,7 +31,7 @@ DoubleArray converted(const py::array_t<double, py::array::c_style | py::array::
     const double* from = colours.data();
     double* to = result.mutable_data();
     const auto count = static_cast<std::size_t>(colours.size()) / 3;
-    const py::gil_scoped_release unlocked;
+    const Unlocked unlocked;
     for (std::size_t i = 0; i < count; ++i, from += 3, to += 3) {
         const Vec3 moved = (self.*by)({from[0], from[1], from[2]});
         for (std::size_t c = 0; c < 3; ++c) to[c] = moved[c];

@@ -3,6 +3,7 @@
 #include "binders.hpp"
 #include "model/slice.hpp"
 #include "recolour/mvc.hpp"
+#include "unlocked.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;
@@ -23,7 +24,7 @@ py::tuple palette_weight_table(const py::object& points, const py::object& rgb,
     double* out = weights.mutable_data();
     double* distance = distances.mutable_data();
     {
-        const py::gil_scoped_release unlocked;
+        const Unlocked unlocked;
         PaletteBody::Workspace workspace;
         for (std::size_t i = 0; i < p.size(); ++i) {
             distance[i] = body.project(p[i], out + i * n, workspace).distance;
@@ -39,7 +40,7 @@ DoubleArray polytope_weight_table(const py::object& points, const Polytope& poly
     const std::size_t columns = polytope.vertices().size();
     DoubleArray weights = table(p.size(), columns);
     double* out = weights.mutable_data();
-    const py::gil_scoped_release unlocked;
+    const Unlocked unlocked;
     const Slice slice = slice_at(polytope, frame);
     const PaletteBody body(slice.rgb, slice.faces);
     PaletteBody::Workspace workspace;

@@ -10,6 +10,7 @@
 #include "convert/colour_spaces.hpp"
 #include "output/drawing.hpp"
 #include "output/scopes.hpp"
+#include "unlocked.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;
@@ -61,7 +62,7 @@ py::array draw(const py::array& image, const std::string& output,
     py::array result = py::array_t<float>({image.shape(0), image.shape(1), image.shape(2)});
     const auto in_view = view_of<ConstImageView>(image, static_cast<const float*>(image.data()));
     const auto out_view = view_of<ImageView>(result, static_cast<float*>(result.mutable_data()));
-    const py::gil_scoped_release unlocked;
+    const Unlocked unlocked;
     draw_picture(in_view, out_view, drawing, premultiplied, threads);
     return result;
 }
@@ -73,7 +74,7 @@ py::tuple scope_counts(const py::array& image, int columns, double zoom, int thr
     if (threads < 0) throw py::value_error("threads: found less than 0, expected 0 or more");
     const auto view = view_of<ConstImageView>(image, static_cast<const float*>(image.data()));
     const ScopeCounts counts = [&] {
-        const py::gil_scoped_release unlocked;
+        const Unlocked unlocked;
         return count_scopes(view, columns, zoom, threads);
     }();
     using Counts = py::array_t<std::uint32_t>;

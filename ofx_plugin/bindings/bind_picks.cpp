@@ -18,6 +18,7 @@
 #include "fit/matte_learning.hpp"
 #include "model/matte.hpp"
 #include "recolour/frame_picks.hpp"
+#include "unlocked.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;
@@ -145,7 +146,7 @@ py::dict learn(const std::vector<GivenFrame>& given, const Vec3& picked,
     LearnedMatte learned;
     Matte matte;
     {
-        const py::gil_scoped_release unlocked;
+        const Unlocked unlocked;
         learned = learn_matte(frames, picked, holds, curve.get());
         matte = matte_of(learned.membership);
     }

@@ -9,6 +9,7 @@
 #include "binders.hpp"
 #include "output/clean_up.hpp"
 #include "recolour/recolour.hpp"
+#include "unlocked.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;
@@ -82,7 +83,7 @@ py::array apply(const Recolourer& self, const py::array& image, double strength,
         options.place = image_place(whole, 0, in_view.height - 1, -1, self.picks());
     }
     {
-        const py::gil_scoped_release unlocked;
+        const Unlocked unlocked;
         self.apply(in_view, out_view, options);
     }
     return result;
@@ -95,7 +96,7 @@ py::array_t<float> straight_colours(const py::array& image, bool premultiplied) 
     const auto from = image.unchecked<float, 3>();
     float* to = result.mutable_data();
     const bool divide = premultiplied && image.shape(2) == 4;
-    const py::gil_scoped_release unlocked;
+    const Unlocked unlocked;
     for (py::ssize_t y = 0; y < from.shape(0); ++y) {
         for (py::ssize_t x = 0; x < from.shape(1); ++x) {
             const float alpha = divide ? from(y, x, 3) : 1;
@@ -128,7 +129,7 @@ void bind_recolour(py::module_& module) {
             [](const Recolourer& self, const py::object& colours, double strength) {
                 std::vector<Vec3> result = colours_from(colours, "colours");
                 {
-                    const py::gil_scoped_release unlocked;
+                    const Unlocked unlocked;
                     for (Vec3& colour : result) colour = self.displaced(colour, strength);
                 }
                 return to_array(result);

@@ -9,6 +9,7 @@
 #include "arrays.hpp"
 #include "binders.hpp"
 #include "fit/progressive_hull.hpp"
+#include "unlocked.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;
@@ -40,7 +41,7 @@ DoubleArray simplified(const Array<double>& points, const Array<int>& simplices,
         bounds.push_back({{row[0], row[1], row[2], row[3]}, row[4]});
     std::vector<std::array<double, 4>> hull;
     {
-        py::gil_scoped_release release;
+        const Unlocked unlocked;
         hull = progressive_hull_4d(p, s, target, bounds);
     }
     DoubleArray out({static_cast<py::ssize_t>(hull.size()), py::ssize_t{4}});

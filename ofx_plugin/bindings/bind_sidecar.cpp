@@ -17,6 +17,7 @@
 #include "recolour/frame_picks.hpp"
 #include "sidecar/clip_name.hpp"
 #include "sidecar/codec.hpp"
+#include "unlocked.hpp"
 
 using palette4d::Edits;
 using palette4d::Json;
@@ -27,6 +28,7 @@ using palette4d::Vec3;
 
 using palette4d::bindings::json_from;
 using palette4d::bindings::python_from;
+using palette4d::bindings::Unlocked;
 
 namespace {
 
@@ -210,7 +212,7 @@ std::unique_ptr<BoundSidecar> with_members(const BoundSidecar& self, const py::d
     const std::string name = utf8_of(called);
     const Json own = json_from(edits, name);
     const Json grids = mattes.is_none() ? Json{{"grids", Json::object()}} : json_from(mattes, name);
-    const py::gil_scoped_release unlocked;
+    const Unlocked unlocked;
     return bound(palette4d::with_edits(self.sidecar, own, grids, name));
 }
 
@@ -220,7 +222,7 @@ py::tuple decode(const py::object& text, const py::str& called) {
     Json tree;
     std::unique_ptr<BoundSidecar> sidecar;
     {
-        const py::gil_scoped_release unlocked;
+        const Unlocked unlocked;
         tree = palette4d::json_tree(bytes, name);
         sidecar = bound(palette4d::sidecar_of(tree, name));
     }
@@ -234,7 +236,7 @@ py::tuple encode(const py::object& members, const py::str& called) {
     std::unique_ptr<BoundSidecar> sidecar;
     std::string text;
     {
-        const py::gil_scoped_release unlocked;
+        const Unlocked unlocked;
         sidecar = bound(palette4d::sidecar_of(tree, name));
         text = palette4d::sidecar_text(tree, name);
     }
@@ -260,7 +262,7 @@ void bind_sidecar(py::module_& module) {
             "picks_at",
             [](const NamedEdits& self, double frame) {
                 if (std::isnan(frame)) throw py::value_error("found a frame that is not a number");
-                const py::gil_scoped_release unlocked;
+                const Unlocked unlocked;
                 return palette4d::picks_at(self, frame);
             },
             py::arg("frame"), "The picks and holds of a frame.")
@@ -304,7 +306,7 @@ void bind_sidecar(py::module_& module) {
             "picks_at",
             [](const BoundSidecar& self, double frame) {
                 const double at = clamped(self, frame);
-                const py::gil_scoped_release unlocked;
+                const Unlocked unlocked;
                 return palette4d::picks_at(self.edits, at);
             },
             py::arg("frame"), "The picks and holds of a frame; outside the clip, at its ends.")
@@ -312,7 +314,7 @@ void bind_sidecar(py::module_& module) {
             "pick_matte_at",
             [](const BoundSidecar& self, const std::string& id, double frame) {
                 const double at = clamped(self, frame);
-                const py::gil_scoped_release unlocked;
+                const Unlocked unlocked;
                 return palette4d::matte_at(self.edits, id, at);
             },
             py::arg("id"), py::arg("frame"),
@@ -326,7 +328,7 @@ void bind_sidecar(py::module_& module) {
         "read_sidecar",
         [](const py::object& path) {
             const std::string bytes = path_bytes(path);
-            py::gil_scoped_release unlocked;
+            const Unlocked unlocked;
             return bound(palette4d::read_sidecar(bytes));
         },
         py::arg("path"), "Read and validate a sidecar file; SidecarError when it is unusable.");
@@ -334,7 +336,7 @@ void bind_sidecar(py::module_& module) {
         "parse_sidecar",
         [](const py::object& text, const py::str& called) {
             const std::string bytes = text_bytes(text), name = utf8_of(called);
-            py::gil_scoped_release unlocked;
+            const Unlocked unlocked;
             return bound(palette4d::parse_sidecar(bytes, name));
         },
         py::arg("text"), py::arg("name") = "<text>",

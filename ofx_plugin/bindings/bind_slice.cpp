@@ -6,6 +6,7 @@
 #include "model/handles.hpp"
 #include "model/lineage.hpp"
 #include "model/ramps.hpp"
+#include "unlocked.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;
@@ -71,7 +72,7 @@ void bind_slice(py::module_& module) {
     module.def(
         "slice_at",
         [](const Polytope& polytope, double frame) {
-            const py::gil_scoped_release unlocked;
+            const Unlocked unlocked;
             return slice_at(polytope, frame);
         },
         py::arg("polytope"), py::arg("frame"),
@@ -81,7 +82,7 @@ void bind_slice(py::module_& module) {
         [](const Polytope& polytope, const Edits& edits, const Slice& slice) {
             std::vector<Vec3> colours;
             {
-                const py::gil_scoped_release unlocked;
+                const Unlocked unlocked;
                 require_slice_of(polytope, slice);
                 colours = edited_colours(polytope, edits, slice);
             }
