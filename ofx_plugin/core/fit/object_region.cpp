@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <queue>
@@ -13,8 +14,9 @@
 namespace palette4d {
 namespace {
 
-/// Width, in pixels, that frames are reduced to at most: codec noise averages out, hair stays.
-constexpr int kWidth = 480;
+/// Width, in pixels, that frames are reduced to at most: codec noise averages out, hair stays. No
+/// picture that is looked at is taller than kHeight then.
+constexpr int kWidth = 480, kHeight = 4 * kWidth;
 /// Half width, in reduced pixels, of the band around the object that is matted. Wider: soft edges
 /// and motion blur are matted. Narrower: less background is left out.
 constexpr int kBand = 8;
@@ -41,22 +43,55 @@ double purity(const Vec3& shown, const Vec3& picked) {
     return 1 - certain + certain * smooth_step(relative, kPale, kPure);
 }
 
+/// Squares of pixels, which may be many and large: each takes the same time.
+class Squares {
+public:
+    explicit Squares(const View& view)
+        : view_(view),
+          stride_(static_cast<std::size_t>(view.width) + 1),
+          changes_(stride_ * (static_cast<std::size_t>(view.height) + 1)) {}
+
+    void add(double x, double y, double radius) {
+        const double x1 = std::max(0.0, std::ceil(x - radius)),
+                     x2 = std::min(view_.width - 1.0, std::floor(x + radius));
+        const double y1 = std::max(0.0, std::ceil(y - radius)),
+                     y2 = std::min(view_.height - 1.0, std::floor(y + radius));
+        if (!(x1 <= x2 && y1 <= y2)) return;
+        const auto left = static_cast<std::size_t>(x1), right = static_cast<std::size_t>(x2) + 1;
+        const auto top = static_cast<std::size_t>(y1) * stride_,
+                   bottom = (static_cast<std::size_t>(y2) + 1) * stride_;
+        ++changes_[top + left];
+        --changes_[top + right];
+        --changes_[bottom + left];
+        ++changes_[bottom + right];
+    }
+
+    /// Marks the pixels that are in one of them.
+    void mark(Mask& mask) const {
+        std::vector<std::int64_t> above(stride_);
+        for (int y = 0; y < view_.height; ++y) {
+            std::int64_t count = 0;
+            for (int x = 0; x < view_.width; ++x) {
+                const auto column = static_cast<std::size_t>(x);
+                above[column] += changes_[static_cast<std::size_t>(y) * stride_ + column];
+                count += above[column];
+                if (count > 0) mask[view_.at(x, y)] = 1;
+            }
+        }
+    }
+
+private:
+    const View& view_;
+    const std::size_t stride_;
+    std::vector<std::int64_t> changes_;  ///< of the count, to the right and below
+};
+
 /// Marks the pixels of areas. `scale`: reduced pixels for each of the frame's.
 void mark(Mask& mask, const View& view, const std::vector<Brush>& areas, double scale) {
+    if (areas.empty()) return;
+    Squares squares(view);
     for (const Brush& area : areas) {
         const double radius = std::max(area.radius * scale, 0.5);
-        const auto square = [&](double x, double y) {
-            const double x1 = std::max(0.0, std::ceil(x - radius)),
-                         x2 = std::min(view.width - 1.0, std::floor(x + radius));
-            const double y1 = std::max(0.0, std::ceil(y - radius)),
-                         y2 = std::min(view.height - 1.0, std::floor(y + radius));
-            if (!(x1 <= x2 && y1 <= y2)) return;
-            for (int row = static_cast<int>(y1); row <= static_cast<int>(y2); ++row) {
-                for (int column = static_cast<int>(x1); column <= static_cast<int>(x2); ++column) {
-                    mask[view.at(column, row)] = 1;
-                }
-            }
-        };
         for (std::size_t i = 0; i < area.points.size(); ++i) {
             // Pixel centres: reduced pixel n has the pixels from n / scale on.
             const double x = (area.points[i][0] + 0.5) * scale - 0.5,
@@ -78,10 +113,11 @@ void mark(Mask& mask, const View& view, const std::vector<Brush>& areas, double 
             clip(from_y, y, view.height);
             for (double step = first; step <= last; step += 1) {
                 const double part = step / steps;
-                square(from_x + part * (x - from_x), from_y + part * (y - from_y));
+                squares.add(from_x + part * (x - from_x), from_y + part * (y - from_y), radius);
             }
         }
     }
+    squares.mark(mask);
 }
 
 /// Where one of several masks is.
@@ -284,7 +320,7 @@ View reduced(const LearningFrame& frame, const Vec3& picked, const DisplayCurve*
     check_areas(frame.object);
     check_areas(frame.others);
     View view;
-    const int by = std::max(1, (frame.width + kWidth - 1) / kWidth);
+    const int by = std::max((frame.width + kWidth - 1) / kWidth, (frame.height - 1) / kHeight + 1);
     view.width = (frame.width + by - 1) / by;
     view.height = (frame.height + by - 1) / by;
     const std::size_t size = view.size();

@@ -17,13 +17,14 @@ namespace {
 constexpr std::size_t kMaxEnabled = 100;
 /// Each key of a path costs time for each frame.
 constexpr std::size_t kMaxPathKeys = 20'000;
-/// Points of strokes in all; of a stroke drawn by hand there are some hundreds.
-constexpr std::size_t kMaxPoints = 100'000;
+/// Areas in all, each of which takes memory and time when its pick is learned, and their points; of
+/// a stroke drawn by hand there are some hundreds.
+constexpr std::size_t kMaxAreas = 1000, kMaxPoints = 100'000;
 
 /// What the picks of a file have together.
 struct Counts {
     std::set<std::string> ids;
-    std::size_t enabled = 0, keys = 0, points = 0;
+    std::size_t enabled = 0, keys = 0, areas = 0, points = 0;
 };
 
 PickWindow read_window(const Cursor& where, Counts& counts) {
@@ -74,6 +75,7 @@ Pick read_pick(const Cursor& where, const PickMattes& mattes, Counts& counts) {
     }
     if (where.has("areas")) {
         const Cursor areas = where.member("areas");
+        areas.limit(counts.areas += areas.size(), kMaxAreas, "areas in all");
         for (std::size_t i = 0; i < areas.size(); ++i) {
             const Cursor area = areas.element(i), points = area.member("points");
             points.limit(counts.points += points.size(), kMaxPoints, "points of areas in all");

@@ -281,6 +281,20 @@ TEST(large_frames_are_reduced) {
     CHECK(membership(matte, kShirt) > 0.95 && membership(matte, kSkin) < 0.05);
 }
 
+TEST(many_points_that_cover_a_tall_frame_are_as_one) {
+    // Pixel by pixel these took half an hour.
+    Frame scene(64, 20'000, kWall);
+    scene.add_noise(8, 0.01);
+    Brush one{{{32, 10'000}}, 1e5}, many{{}, 1e5};
+    for (int i = 0; i < 100'000; ++i) {
+        many.points.push_back({static_cast<double>(i % 64), static_cast<double>(i % 20'000)});
+    }
+    const LearnedMatte same = learn_matte({scene.frame(kWall, {one})}, kWall, {}, nullptr),
+                       matte = learn_matte({scene.frame(kWall, {many})}, kWall, {}, nullptr);
+    CHECK(sound(matte) && matte.found);
+    CHECK(matte.membership == same.membership && matte.share == same.share);
+}
+
 TEST(a_frame_of_one_colour_is_all_object) {
     const Frame scene(64, 36, kShirt);
     const LearnedMatte matte =

@@ -270,6 +270,12 @@ TEST(picks_and_mattes_are_bounded) {
         refused(replaced(version_2(), "[[1, 2], [3, 4.5]]", '[' + points + ',' + points + ']'))
             .pointer(),
         std::string("/edits/picks/0/areas/0/points"));
+    const auto with_areas = [&](int count) {
+        const std::string area = "{\"frame\": 3, \"points\": [[1, 2], [3, 4.5]], \"radius\": 2}";
+        return replaced(version_2(), area, listed(count, [&](const std::string&) { return area; }));
+    };
+    CHECK_EQUAL(parse_sidecar(with_areas(1000), "many").edits.picks.size(), 2u);
+    CHECK_EQUAL(refused(with_areas(1001)).pointer(), std::string("/edits/picks/0/areas"));
 }
 
 TEST(picks_that_are_drawn_are_bounded) {
