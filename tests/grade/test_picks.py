@@ -14,7 +14,7 @@ from palette4d.grade.clip_colours import ClipColours
 from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.document import Document
 from palette4d.grade.later import with_readings
-from palette4d.grade.picks import MOST_PICKS, PathKey, Pick, Window, WindowKey
+from palette4d.grade.picks import MOST_AREAS, MOST_PICKS, Area, PathKey, Pick, Window, WindowKey
 from palette4d.media.array_clip import ArrayClip
 
 GREY = (0.5, 0.5, 0.5)
@@ -367,4 +367,21 @@ def test_python_and_the_core_allow_as_many_enabled_picks(tmp_path: Path) -> None
     assert sum(one.enabled for one in again.grade.picks) == MOST_PICKS
     picks[-1]["enabled"] = True
     with pytest.raises(SidecarError, match=rf"/edits/picks: found {MOST_PICKS + 1} enabled"):
+        Document(fields)
+
+
+def test_python_and_the_core_allow_as_many_areas(tmp_path: Path) -> None:
+    document = Document.load(SPLIT)
+    areas = [Area(8, ((float(n), 1.0),), 1.0) for n in range(MOST_AREAS)]
+    document.pick(8, colour=GREY, by=(0.2, 0, 0), follow=False, areas=areas)
+    document.save(tmp_path / "full.p4d.json")
+    assert Document.load(tmp_path / "full.p4d.json").grade.pick("p1").areas == tuple(areas)
+    with pytest.raises(Palette4dError, match=f"{MOST_AREAS + 1} areas .* at most {MOST_AREAS}"):
+        document.change_pick("p1", areas=(*areas, areas[0]), clip=later.Unread())
+    assert document.grade.pick("p1").areas == tuple(areas)
+    fields = document.fields()
+    fields["edits"]["picks"][0]["areas"] *= 2
+    with pytest.raises(
+        SidecarError, match=f"areas in all.*at most {MOST_AREAS}|{2 * MOST_AREAS} areas"
+    ):
         Document(fields)

@@ -19,7 +19,7 @@ constexpr std::size_t kMaxEnabled = 100;
 constexpr std::size_t kMaxPathKeys = 20'000;
 /// Areas in all, each of which takes memory and time when its pick is learned, and their points; of
 /// a stroke drawn by hand there are some hundreds.
-constexpr std::size_t kMaxAreas = 1000, kMaxPoints = 100'000;
+constexpr std::size_t kMaxAreas = 200, kMaxPoints = 100'000;
 
 /// What the picks of a file have together.
 struct Counts {

@@ -18,6 +18,7 @@ from palette4d.grade.follow import Progress
 from palette4d.grade.grade import Grade
 from palette4d.grade.mattes import Learned, odds_of
 from palette4d.grade.picks import (
+    MOST_AREAS,
     MOST_PICKS,
     Area,
     PathKey,
@@ -402,7 +403,13 @@ def _add(
 
 def _learned(grade: Grade, clip: ClipOfPicks, pick: Pick, label: str) -> Grade:
     """Set a pick or hold with a new matte; picks and holds change each other's mattes."""
-    return _with_mattes(grade.put("pick", pick.id, pick), clip, [pick]).labelled(label)
+    grade = grade.put("pick", pick.id, pick)
+    if (areas := sum(len(each.areas) for each in grade.picks)) > MOST_AREAS:
+        raise Palette4dError(
+            f"found {areas} areas of picks and holds, expected at most {MOST_AREAS}; remove some "
+            "picks (`unpick`), and pick again with fewer"
+        )
+    return _with_mattes(grade, clip, [pick]).labelled(label)
 
 
 def _with_mattes(grade: Grade, clip: ClipOfPicks, changed: Sequence[Pick]) -> Grade:

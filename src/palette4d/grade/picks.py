@@ -27,6 +27,9 @@ Toward = Literal["shift", "colour"]
 #: Most enabled picks and holds, as in the core (read_picks.cpp): each costs time for each pixel.
 MOST_PICKS = 100
 
+#: Most areas of all picks and holds, as in the core: each costs time when its pick is learned.
+MOST_AREAS = 200
+
 #: Standard deviation, in code values, of one object's colours when a colour is followed.
 ALIKE = 0.08
 
