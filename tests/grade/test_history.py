@@ -22,6 +22,10 @@ AREA = {"frame": 2, "points": [[3, 10], [{}, 10]], "radius": 1.5}
 PICK = {"id": "p1", "kind": "pick", "frame": 5, "rgb": [0, 0, 0], "to": [1, 1, 1]}
 
 
+def version(pick: dict[str, Any]) -> dict[str, Any]:
+    return {"vertices": [], "stops": [], "picks": [pick]}
+
+
 @pytest.fixture
 def plain(tmp_path: Path) -> Path:
     path = tmp_path / "clip.p4d.json"
@@ -147,6 +151,21 @@ def test_the_history_stays_small(plain: Path) -> None:
         {"done": [{"step": "x", "changes": [["pick", "p1", None, {"id": "p1"}]]}]},
         {"done": [{"step": "x", "changes": [["pick", "p1", None, PICK | {"fade": "5"}]]}]},
         {"done": [{"step": "x", "changes": [["pick", "p1", None, PICK | {"areas": [AREA]}]]}]},
+        {"done": [{"step": "x", "changes": [["pick", "p1", None, PICK | {"matte": {}}]]}]},
+        {
+            "done": [
+                {"step": "x", "changes": [["version", "a", version(PICK | {"fade": "5"}), None]]}
+            ]
+        },
+        {
+            "done": [
+                {
+                    "step": "x",
+                    "changes": [["version", "a", version(PICK | {"areas": [AREA]}), None]],
+                }
+            ]
+        },
+        {"done": [{"step": "x", "changes": [["version", "a", version(PICK | {"id": 5}), None]]}]},
         {"undone": [{"step": 3, "changes": [["lock", "v1", None, True]]}]},
         {"undone": [{"step": "x", "changes": [["lock", "v1", None, 3]]}]},
         {"done": [{"step": "x", "changes": [["lock", "v1", None, True]], "unread": 1}]},

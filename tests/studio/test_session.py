@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import shutil
@@ -16,6 +17,8 @@ from clip_files import grey_levels
 
 import palette4d
 from palette4d.cli.main import main
+from palette4d.grade.document import Document
+from palette4d.studio import texts
 from palette4d.studio.session import (
     SAVE_AFTER,
     SAVE_AT_MOST,
@@ -197,7 +200,6 @@ def test_what_an_earlier_session_could_not_save_stays(
     assert not session.save()
     sidecar.write_bytes(whole)
     copy = next(recovery_files(sidecar))
-    os.utime(sidecar, (0, 0))
     later = Session()
     later.open_sidecar(sidecar)
     assert recovered(sidecar) == copy
@@ -211,21 +213,53 @@ def test_what_an_earlier_session_could_not_save_stays(
     sidecar.write_bytes(whole)
 
 
-def test_edits_are_offered_again_though_the_disk_has_a_clock_of_its_own(
+def test_edits_are_offered_again_whatever_the_clocks_say(
     session: Session, sidecar: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """The file server's is ten minutes ahead; once the sidecar is written again they are not."""
+    """The disks of both files have clocks and steps of their own, and others edit the sidecar."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    id_, whole, saved = vertex(sidecar), sidecar.read_bytes(), time.time() + 600
-    sidecar.write_text("{")
-    os.utime(sidecar, (saved, saved))
-    session.edit(lambda document: document.set(id_, rgb=(1.0, 0.0, 0.0)))
-    assert not session.save()
+    id_, whole = vertex(sidecar), sidecar.read_bytes()
+    first, second = itertools.islice(recovery_files(sidecar), 2)
+    sessions = session, Session()
+    sessions[1].open_sidecar(sidecar)
+    for red, each in enumerate(sessions):
+        sidecar.write_text("{")
+        each.edit(lambda document, red=red: document.set(id_, rgb=(float(red), 0.5, 0.0)))
+        assert not each.save()
     sidecar.write_bytes(whole)
-    os.utime(sidecar, (saved, saved))
-    assert recovered(sidecar) == next(recovery_files(sidecar))
-    os.utime(sidecar, (saved + 1, saved + 1))
+    os.utime(first, (1, 1))
+    assert recovered(sidecar) == second
+    first.unlink()
+    for when in (1, time.time() + 600):
+        os.utime(sidecar, (when, when))
+        assert recovered(sidecar) == second
+    assert sessions[1].save()
     assert recovered(sidecar) is None
+
+
+def test_whatever_a_save_fails_with_the_edits_are_kept(
+    session: Session, sidecar: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    session.edit(lambda document: document.set(vertex(sidecar), rgb=(1.0, 0.0, 0.0)))
+    save = Document.save
+
+    def fails(document: Document, path: object = None, **how: object) -> None:
+        if path is None:
+            raise TypeError("a fault of the program")
+        save(document, path, **how)
+
+    monkeypatch.setattr(Document, "save", fails)
+    assert not session.save()
+    assert "a fault of the program" in session.status.text
+    copy = recovered(sidecar)
+    assert copy is not None
+    assert str(copy) in session.status.text
+    # Without a place for it the edits are in the window alone.
+    shutil.rmtree(copy.parent)
+    copy.parent.touch()
+    assert not session.save()
+    assert texts.KEPT_HERE in session.status.text
 
 
 def test_saved_in_another_folder_the_sidecar_finds_its_clip(

@@ -148,9 +148,11 @@ def edits_from(fields: Mapping[str, Any]) -> dict[Key, Any]:
     if fields.get("ramp", "linear") != "linear":
         state[RAMP] = as_ramp(fields["ramp"])
     for pick in fields.get("picks", ()):
-        state["pick", pick["id"]] = Pick.from_fields(pick)
+        state["pick", pick["id"]] = _pick(pick)
     for id_ in fields.get("locks", ()):
         state["lock", id_] = True
+    for _, id_ in state:
+        _typed(id_, str)
     return state
 
 
@@ -202,6 +204,10 @@ def _pick(fields: Mapping[str, Any]) -> Pick:
         raise ValueError(f"found the pick {fields['id']!r}, expected its kind and frame")
     pick = Pick.from_fields(fields)
     pick.to_fields()  # refuses other things in the place of numbers
+    try:
+        hash(pick)
+    except TypeError:
+        raise ValueError(f"found lists in the pick {pick.id!r}, expected texts") from None
     return pick
 
 

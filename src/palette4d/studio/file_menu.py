@@ -53,7 +53,6 @@ class FileMenu:
             self.window.verbs.analyze_show(path)
         elif found.name.endswith(".json"):
             self._open_sidecar(found, clip)
-            self._offer_recovery(found)
         else:
             beside_it = sidecar_of(path)
             if beside_it is not None:
@@ -71,13 +70,26 @@ class FileMenu:
         self.session.open_sidecar(path, clip)
         if frame is not None:
             self.session.go(frame)
+        self._offer_recovery(path)
 
     def _offer_recovery(self, path: Path) -> None:
         copy = recovered(path)
         if copy is not None:
             self.session.say(texts.RECOVERY.format(copy=copy), "warning")
-            opens = {texts.OPEN_COPY: lambda: self.open_path(str(copy))}
-            self.window.banner.tell("recovery", self.session.status.text, "warning", opens)
+            does = {
+                texts.OPEN_COPY: lambda: self.open_path(str(copy)),
+                texts.DISCARD_COPY: lambda: self._discard(copy),
+            }
+            self.window.banner.tell("recovery", self.session.status.text, "warning", does)
+
+    def _discard(self, copy: Path) -> None:
+        """Remove edits that could not be saved."""
+        try:
+            copy.unlink(missing_ok=True)
+        except OSError as error:
+            self.session.report(error)
+        else:
+            self.window.banner.drop("recovery")
 
     def mark_open(self, path: Path | None) -> None:
         """Keep which sidecar is open, until it is closed: after a crash it is offered again."""

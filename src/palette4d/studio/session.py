@@ -407,16 +407,14 @@ class Session(Drafts):
         before = document.grade.state
         try:
             document.save()
-        except (Palette4dError, OSError) as error:
+        except Exception as error:  # whatever fails, the edits stay, and the window says so
             self._next_try = (time.monotonic() if now is None else now) + TRY_AGAIN
             self._keep_copy(error)
             return False
         self._edited_at = None
         self._stamp = _stamp(document.path)
-        if self._copy is not None:  # what another session could not save is not touched
-            with contextlib.suppress(OSError):
-                self._copy.unlink(missing_ok=True)
-            self._copy = None
+        if self._copy is not None:
+            self._drop_copy()
             self.say(texts.SAVED_NOW)
         if document.grade.state != before:
             self.say(texts.MERGED)
@@ -431,18 +429,24 @@ class Session(Drafts):
         """Say why a save failed, and keep the edits in a file of the user's state folder."""
         assert self._document is not None
         assert self._document.path is not None
-        copy = self._copy or next(p for p in recovery_files(self._document.path) if not p.exists())
         try:
+            path = self._document.path
+            copy = self._copy or next(p for p in recovery_files(path) if not p.exists())
             copy.parent.mkdir(parents=True, exist_ok=True)
             self._elsewhere(self._document).save(copy, on_edits="drop")
             self._copy = copy
-            with contextlib.suppress(OSError):  # it may be gone
-                times = self._document.path.stat()
-                os.utime(copy, ns=(times.st_atime_ns, times.st_mtime_ns))
             kept = texts.KEPT_IN.format(copy=copy)
-        except (Palette4dError, OSError):
+        except Exception:
             kept = texts.KEPT_HERE
-        self.say(f"{texts.NOT_SAVED} {in_words(error)}. {kept}", "error", "not saved")
+        why = in_words(error) or type(error).__name__
+        self.say(f"{texts.NOT_SAVED} {why}. {kept}", "error", "not saved")
+
+    def _drop_copy(self) -> None:
+        """Remove the copy of this session, not what another one could not save."""
+        if self._copy is not None:
+            with contextlib.suppress(OSError):
+                self._copy.unlink(missing_ok=True)
+        self._copy = None
 
     @staticmethod
     def _elsewhere(document: Document) -> Document:
@@ -465,6 +469,7 @@ class Session(Drafts):
             return False
         self._document, self._trial, self._dragged = loaded, None, None
         self._edited_at, self._stamp = None, _stamp(Path(path))
+        self._drop_copy()
         self.say(texts.SAVED_AS.format(name=Path(path).name))
         self._changed()
         return True
@@ -494,23 +499,26 @@ class Session(Drafts):
 
 def recovery_files(sidecar: Path) -> Iterator[Path]:
     """Yield where edits are kept when the sidecar cannot be written: each session takes another."""
-    name = hashlib.sha256(os.fsencode(os.path.realpath(sidecar))).hexdigest()[:12]
-    folder = state_folder() / "palette4d" / "recovery"
+    folder, name = _recovery(sidecar)
     # At most 255 bytes: two names may begin alike, their hashes do not.
     short = os.fsencode(sidecar.name)[-200:].decode("utf-8", "ignore")
     return (folder / f"{name}-{number}-{short}" for number in itertools.count(1))
 
 
 def recovered(sidecar: Path) -> Path | None:
-    """Return the newest edits of a sidecar that could not be saved, if it is as it was then.
-
-    A copy has the time of the sidecar that could not be written, whose disk may have its own clock.
-    """
-    kept = [*itertools.takewhile(Path.exists, recovery_files(sidecar))]
-    newest = max(reversed(kept), key=lambda path: path.stat().st_mtime_ns, default=None)
-    if newest is None or newest.stat().st_mtime_ns < sidecar.stat().st_mtime_ns:
+    """Return the newest edits of a sidecar that could not be saved."""
+    try:
+        folder, name = _recovery(sidecar)
+        kept = [path for path in folder.iterdir() if path.name.startswith(f"{name}-")]
+        return max(kept, key=lambda path: path.stat().st_mtime_ns, default=None)
+    except (OSError, RuntimeError):  # no such folder; a user without a home
         return None
-    return newest
+
+
+def _recovery(sidecar: Path) -> tuple[Path, str]:
+    """Return the folder of what could not be saved, and how the names of a sidecar's begin."""
+    name = hashlib.sha256(os.fsencode(os.path.realpath(sidecar))).hexdigest()[:12]
+    return state_folder() / "palette4d" / "recovery", name
 
 
 def _stamp(path: Path) -> tuple[int, int, int] | None:

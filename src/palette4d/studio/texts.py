@@ -66,7 +66,8 @@ BEYOND = "the clip has no frame {frame}; its frames are {first} to {last}"
 # ------------------------------------------------------------------------------- above the picture
 BANNER = "Problems"
 FIND_CLIP, SAVE_ELSEWHERE, TRY_AGAIN = "Find the clip…", "Save as…", "Try again"
-CHANGE, REOPEN, OPEN_COPY = "Change…", "Reopen", "Open the copy"
+CHANGE, REOPEN = "Change…", "Reopen"
+OPEN_COPY, DISCARD_COPY = "Open the copy", "Discard it"
 FOLLOW_NOW, UNFOLLOWED = "Follow now", "Not followed through the clip yet: {ids}."
 ASSUMED = "The clip does not state its colour space. Its code values are shown as they are."
 CRASHED = "{name} was open in a window that ended without closing. Its edits are in the file."
@@ -105,7 +106,7 @@ NO_PALETTE = "no palette yet"
 AS_IS_STATUS = "unknown encoding: code values as they are"
 LUT_ERROR = "preview LUT error while dragging: {error:.1f}/255"
 OUTSIDE, NEARLY_NONE = "{share} of the pixels outside the palette", "<0.1 %"
-RECOVERY = "edits that could not be saved are in {copy}; File > Open loads them"
+RECOVERY = "edits that could not be saved are in {copy}"
 
 UNEXPECTED = "something went wrong in the program: {error}. Your edits are kept"
 
