@@ -109,6 +109,18 @@ def test_an_error_stays_until_it_is_closed_and_leaves_with_its_clip(
     assert session.status.level == "info"
 
 
+def test_the_first_thing_has_room_for_its_words(opened: Window, qtbot: Any) -> None:
+    """The row kept the height that it had had before the banner was seen: none."""
+    opened.banner.tell("notes", "the palette spans a sudden cut", "warning", {})
+
+    def seen() -> bool:
+        labels = opened.banner.findChildren(QLabel)
+        return all(label.height() > 10 for label in labels if label.isVisible())
+
+    qtbot.waitUntil(seen)
+    assert "sudden cut" in said(opened)
+
+
 def test_a_second_thing_that_is_wrong_is_seen_too(
     window: Window, sidecar: Path, tmp_path: Path, qtbot: Any
 ) -> None:

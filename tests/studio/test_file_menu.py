@@ -135,7 +135,7 @@ def test_a_clip_without_a_palette_is_offered_to_be_analysed(
     window.open_path(str(tmp_path / "new" / "frame.####.png"))
     assert window.session.document is None
     (dialog,) = window.verbs.dialogs
-    assert dialog.command.text().startswith("palette4d analyze ")
+    assert dialog.command.toPlainText().startswith("palette4d analyze ")
     dialog.start()
     qtbot.waitUntil(lambda: window.session.document is not None, timeout=120_000)
     assert (tmp_path / "new" / "frame.p4d.json").is_file()

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
 from windows import FRAME, Settle, seen
 
 from palette4d.grade.answer import Answer, Note
@@ -243,3 +245,41 @@ def test_screen_readers_know_its_fields(rows: WindowRows) -> None:
     assert all(names)
     assert len({*names}) == 5  # the bar and its number are the same thing
     assert all(part.toolTip() for part in (rows.on, *rows.numbers.values(), rows.feather))
+
+
+def test_the_keyboard_goes_to_the_picture_when_the_numbers_go(
+    rows: WindowRows, opened: Window, settle: Settle
+) -> None:
+    """Space, which plays, removed the pick: Qt gave the keyboard to the button *Remove*."""
+    switch(rows)
+    settle(opened)
+    number = rows.numbers["x"]
+    number.setFocus()
+    opened._do("undo")
+    settle(opened)
+    assert not number.isVisible()
+    assert opened.focusWidget() is opened.viewer
+
+
+def test_the_wheel_scrolls_and_changes_no_number_below_it(
+    rows: WindowRows, opened: Window, settle: Settle
+) -> None:
+    switch(rows)
+    settle(opened)
+    before, number = window_of(rows), rows.numbers["x"]
+    opened.viewer.setFocus()
+    where = QPointF(number.rect().center())
+    for _ in range(3):
+        wheel = QWheelEvent(
+            where,
+            number.mapToGlobal(where),
+            QPoint(),
+            QPoint(0, -120),
+            Qt.MouseButton.NoButton,
+            Qt.KeyboardModifier.NoModifier,
+            Qt.ScrollPhase.NoScrollPhase,
+            False,
+        )
+        QApplication.sendEvent(number, wheel)
+    assert window_of(rows) == before
+    assert not number.hasFocus()

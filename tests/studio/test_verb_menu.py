@@ -43,7 +43,7 @@ def test_the_options_of_an_analysis(opened: Window, sidecar: Path) -> None:
     enter(dialog, "--set", "a=1  b=2")
     added = ["--vertices", "9", "--method", "paper", "--set", "a=1", "--set", "b=2"]
     assert dialog.words() == ["analyze", clip, "-o", str(sidecar), "--keep-edits", *added]
-    assert dialog.command.text().endswith(
+    assert dialog.command.toPlainText().endswith(
         "--keep-edits --vertices 9 --method paper --set a=1 --set b=2"
     )
 
@@ -224,6 +224,9 @@ def test_a_sudden_cut_has_a_button_that_allows_it(
     dialog.start()
     qtbot.waitUntil(lambda: dialog.stage.text() == texts.FAILED, timeout=60_000)
     assert "sudden cut" in dialog.log.toPlainText()
+    dialog.offer([f"--frames {number}-{number + 10}" for number in range(1000, 1060, 10)])
+    dialog.adjustSize()
+    assert all(button.width() >= button.sizeHint().width() for button in dialog.offers)
     allow = next(
         button for button in dialog.offers if button.text() == texts.OFFERS["--allow-cuts"]
     )

@@ -137,6 +137,23 @@ def test_a_name_is_typed_in_its_place(gallery: Gallery, opened: Window, qtbot: A
     assert opened.session.view.version == "warm"
 
 
+def test_a_version_stays_selected_under_its_new_name(
+    gallery: Gallery, opened: Window, qtbot: Any
+) -> None:
+    """Its place may be another one: the next key is for it."""
+    choose(gallery, 0)
+    gallery.list.setCurrentRow(0)
+    gallery.list.setFocus()
+    QTest.keyClick(gallery.list, Qt.Key.Key_F2)
+    assert opened.session.view.compare == "after"
+    editor = gallery.list.findChild(QLineEdit)
+    assert editor is not None
+    editor.setText("Z")
+    QTest.keyClick(editor, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: names(gallery) == ["B", "Z"])
+    assert gallery.chosen == ["Z"]
+
+
 def test_a_name_that_another_version_has_is_refused(
     gallery: Gallery, opened: Window, qtbot: Any
 ) -> None:

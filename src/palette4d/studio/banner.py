@@ -163,6 +163,7 @@ class Banner(QFrame):
             row.show()  # what is not shown yet takes no room in `_fit`
         self.setVisible(bool(self.entries))
         self._fit()
+        self._rows.invalidate()  # laid out without any height, the first row kept none
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Ask for the room that the wrapped words need: the window's layout does not."""

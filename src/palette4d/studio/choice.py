@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 
 from PySide6.QtCore import QPointF, Qt
-from PySide6.QtGui import QColor, QFocusEvent, QPainter, QPaintEvent, QPolygonF
+from PySide6.QtGui import QColor, QFocusEvent, QPainter, QPaintEvent, QPolygonF, QWheelEvent
 from PySide6.QtWidgets import QComboBox, QCompleter
 
 from palette4d.studio import theme
@@ -21,6 +21,10 @@ class Choice(QComboBox):
         painter.setBrush(QColor(theme.TEXT if self.isEnabled() else theme.FAINT))
         x, y = self.width() - 10.0, self.height() / 2 - 2
         painter.drawPolygon(QPolygonF([QPointF(x - 4, y), QPointF(x + 4, y), QPointF(x, y + 5)]))
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Leave the wheel to what scrolls: nobody wants to choose by chance."""
+        event.ignore()
 
 
 class SearchChoice(Choice):

@@ -256,8 +256,6 @@ class PickPanel(QWidget):
         if found is None:
             return
         note = found.notes[k]
-        # The button goes when that is done, and the keyboard would go to the next one: *Remove*.
-        self.notes[k].button.clearFocus()
         if note.window is not None:
             grade_steps.set_window(self.session, note.id, found.frame, note.window)
         if note.place is None:
@@ -338,7 +336,6 @@ class PickPanel(QWidget):
     def _clear(self, words: str = "") -> None:
         """Show no answer, but words instead of it."""
         for line in (*self.notes, self.warning):
-            line.button.clearFocus()  # as it goes: else the keyboard would go to the next one
             line.say("")
         self.takes.button.hide()
         self.takes.say(words)

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
     QFormLayout,
+    QGridLayout,
     QHBoxLayout,
     QLabel,
     QLineEdit,
@@ -35,6 +36,8 @@ Entry = QLineEdit | QComboBox | QCheckBox
 
 #: Options that a button enters and runs with at once: nothing is lost by them.
 RUN_AT_ONCE = ("--allow-cuts", "--skip-bad-frames")
+#: Buttons of offers side by side, so that their words have room.
+OFFERS_IN_ROW = 3
 
 
 @dataclass(frozen=True)
@@ -147,13 +150,17 @@ class VerbDialog(QDialog):
         caption.setStyleSheet(f"color: {theme.FAINT}")
         column.addWidget(caption)
         line = QHBoxLayout()
-        self.command = QLineEdit()
+        self.command = QPlainTextEdit()
         self.command.setReadOnly(True)
+        self.command.setTabChangesFocus(True)
         self.command.setFont(theme.numbers_font())
+        self.command.setFixedHeight(2 * self.command.fontMetrics().lineSpacing() + 14)
         line.addWidget(self.command)
         copy = QPushButton(texts.COPY)
         copy.setAutoDefault(False)
-        copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.command.text()))
+        copy.clicked.connect(
+            lambda: QGuiApplication.clipboard().setText(self.command.toPlainText())
+        )
         line.addWidget(copy)
         column.addLayout(line)
         self.bar = QProgressBar()
@@ -168,7 +175,7 @@ class VerbDialog(QDialog):
             widget.hide()
             column.addWidget(widget)
         self.offers: list[QPushButton] = []
-        self._offered = QHBoxLayout()
+        self._offered = QGridLayout()
         column.addLayout(self._offered)
         buttons = QHBoxLayout()
         buttons.addStretch(1)
@@ -274,8 +281,7 @@ class VerbDialog(QDialog):
         entry.setFocus()
 
     def _show_command(self) -> None:
-        self.command.setText(command_line(self.words()))
-        self.command.setCursorPosition(0)
+        self.command.setPlainText(command_line(self.words()))
 
     def start(self) -> None:
         """Run the verb."""
@@ -334,7 +340,7 @@ class VerbDialog(QDialog):
                     button.setAutoDefault(False)
                     take = functools.partial(self._take, field, entry, value or option)
                     button.clicked.connect(take)
-                    self._offered.addWidget(button)
+                    self._offered.addWidget(button, *divmod(len(self.offers), OFFERS_IN_ROW))
                     self.offers.append(button)
 
     def _take(self, field: Field, entry: Entry, value: str) -> None:

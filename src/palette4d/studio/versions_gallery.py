@@ -1,6 +1,6 @@
 """The versions of the grade as a gallery: a picture of the playhead's frame, a name, a note."""
 
-from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRect, QSize, Qt, QTimer
+from PySide6.QtCore import QEvent, QModelIndex, QPersistentModelIndex, QRect, QSize, Qt, QTimer
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPixmap
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -198,6 +198,8 @@ class Gallery(QWidget):
     def _rename(self, old: str, new: str) -> None:
         grade_steps.rename_version(self.session, old, new)
         self.refresh()
+        for k in range(self.list.count()):  # its place has changed with its name
+            self.list.item(k).setSelected(self.list.item(k).data(NAME) == new)
 
     def _note_typed(self) -> None:
         chosen = self.chosen
@@ -273,6 +275,14 @@ class _Versions(QListWidget):
     def __init__(self, gallery: Gallery) -> None:
         super().__init__()
         self.gallery = gallery
+
+    def event(self, event: QEvent) -> bool:
+        """F2 renames here; else it is a key of the window."""
+        keys = isinstance(event, QKeyEvent) and event.type() == QEvent.Type.ShortcutOverride
+        if keys and event.key() == Qt.Key.Key_F2 and self.gallery.chosen:
+            event.accept()
+            return True
+        return super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Delete removes, Enter uses the selected version."""

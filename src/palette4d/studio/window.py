@@ -25,6 +25,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractSpinBox,
+    QApplication,
     QComboBox,
     QDockWidget,
     QLineEdit,
@@ -34,6 +35,7 @@ from PySide6.QtWidgets import (
     QVBoxLayout,
     QWidget,
 )
+from shiboken6 import isValid
 
 from palette4d.common.errors import Palette4dError
 from palette4d.studio import menu_entries, texts
@@ -139,6 +141,9 @@ class Window(QMainWindow):
         for event in ("document", "status", "clip", "selection", "view", "playing"):
             session.on(event, self._show, panel=True)
         session.on("selection", self._bring_inspector)
+        app = QApplication.instance()
+        assert isinstance(app, QApplication)
+        app.focusChanged.connect(self._keep_focus)
         self._closing = False  # when no edit reads the clip any more
         session.on("followed", self._close_if_followed)
         self._first_state = self.saveState()
@@ -152,6 +157,16 @@ class Window(QMainWindow):
         self._timer.timeout.connect(session.tick)
         self._timer.start(TICK)
         self._show()
+
+    def _keep_focus(self, old: QWidget | None, new: QWidget | None) -> None:
+        """Give the keyboard to the picture where what had it is gone.
+
+        Qt gives it to the next button, such as *Remove*, which Space would press.
+        """
+        if old is None or not isinstance(new, QAbstractButton) or new.window() is not self:
+            return
+        if not isValid(old) or not old.isVisible() or not old.isEnabled():
+            self.viewer.setFocus()
 
     # ------------------------------------------------------------------------------------- layout
 
