@@ -16,9 +16,10 @@ from PySide6.QtWidgets import QMenu, QWidget
 from palette4d.cli.main import main
 from palette4d.grade.document import Document
 from palette4d.grade.picks import Pick
-from palette4d.studio import texts
+from palette4d.studio import grade_steps, texts
 from palette4d.studio.inspector import Scope
 from palette4d.studio.session import Session
+from palette4d.studio.states import Place
 from palette4d.studio.timeline_menu import menu_for
 from palette4d.studio.window import Window
 
@@ -444,3 +445,18 @@ def test_every_gesture_leaves_the_bytes_of_its_verb(
         assert sidecar.read_bytes() == twin.read_bytes(), f"{name}: {' '.join(said)}"
         done += 1
     assert done >= 30
+
+
+def test_a_switch_reads_the_clip_beside_the_window(opened: Window, qtbot: Any) -> None:
+    """The holds are learned again without the pick: the window stood still for seconds."""
+    session = opened.session
+    grade_steps.hold(session, Place(6, 120, 70, 5, (0.2, 0.6, 0.3)))
+    source = grade_steps.source_of(session)
+    session.edit(lambda d: d.pick(6, pixel=(40, 30), to=(0.9, 0.1, 0.5), clip=source))
+    qtbot.waitUntil(lambda: not session.following, timeout=20_000)
+    for on in (False, True):
+        grade_steps.enable(session, "p2", on)
+        assert session.following
+        assert session.document is not None
+        assert session.document.grade.pick("p2").enabled == on
+        qtbot.waitUntil(lambda: not session.following, timeout=20_000)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import pytest
 from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QKeySequence
 from PySide6.QtTest import QTest
@@ -94,6 +95,16 @@ def test_arrows_move_a_cross_that_picks(opened: Window, settle: Settle, qtbot: A
     QTest.keyClick(viewer, Qt.Key.Key_Return)
     assert session.place is not None
     assert (session.place.x, session.place.y) == (session.probe.x, session.probe.y)
+    # Its colour is typed, and then it is a pick.
+    field = opened.focusWidget()
+    assert field is opened.inspector.hex
+    QTest.keyClicks(field, "#2040b0")
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    assert session.document is not None
+    (made,) = session.document.grade.picks
+    assert made.to == pytest.approx((0x20 / 255, 0x40 / 255, 0xB0 / 255), abs=1e-4)
+    qtbot.waitUntil(lambda: not session.following, timeout=20_000)
+    viewer.setFocus()
     QTest.keyClick(viewer, Qt.Key.Key_Escape)
     assert viewer.cross.at is None
     QTest.keyClick(viewer, Qt.Key.Key_Right)

@@ -41,7 +41,7 @@ def reset(session: Session) -> None:
 
     alone = not ids or (not picks and len(ids) == 1)
     both = [*(pick.id for pick in picks), *ids]
-    _as_one(session, "reset", both, change, said, alone=alone, learns=_holds(picks))
+    _as_one(session, "reset", both, change, said, alone=alone, learns=bool(picks))
 
 
 def reset_all(session: Session) -> None:
@@ -66,7 +66,7 @@ def remove(session: Session, ids: list[str]) -> None:
 
     alone = not (locks and picks)
     both = [*locks, *names]
-    _as_one(session, "remove", both, change, texts.REMOVED, alone=alone, learns=_holds(picks))
+    _as_one(session, "remove", both, change, texts.REMOVED, alone=alone, learns=bool(picks))
 
 
 def lock(session: Session) -> None:
@@ -113,7 +113,7 @@ def enable(session: Session, id_: str, on: bool) -> None:
 
     picks = [] if document is None else [pick for pick in document.grade.picks if pick.id == id_]
     said, verb = (texts.ENABLED, "enable") if on else (texts.DISABLED, "disable")
-    _as_one(session, verb, [id_], change, said, alone=False, learns=_holds(picks))
+    _as_one(session, verb, [id_], change, said, alone=False, learns=bool(picks))
 
 
 def change_pick(session: Session, id_: str, text: str, **changes: Any) -> None:
@@ -325,11 +325,6 @@ def source_of(session: Session) -> str | None:
     return None if session.clip is None else session.clip.source
 
 
-def _holds(picks: list[Pick]) -> bool:
-    """Return whether holds are among these, so that the others are learned again."""
-    return any(pick.kind == "hold" for pick in picks)
-
-
 def _as_one(
     session: Session,
     verb: str,
@@ -340,7 +335,10 @@ def _as_one(
     alone: bool,
     learns: bool = False,
 ) -> None:
-    """Do a change of several as one step; alone it is one step by itself."""
+    """Do a change of several as one step; alone it is one step by itself.
+
+    With `learns` it reads the clip: picks and holds change what the others are learned from.
+    """
 
     def whole(document: Document, clip: OfClip | None, _: Progress | None = None) -> None:
         if alone:
@@ -353,4 +351,4 @@ def _as_one(
     if ids and learns:
         session.edit_later(whole, said)
     elif ids:
-        session.edit(lambda document: whole(document, source_of(session)), said)
+        session.edit(lambda document: whole(document, None), said)

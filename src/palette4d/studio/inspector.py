@@ -446,6 +446,11 @@ class Inspector(QWidget):
             return
         self.session.begin_pick(place)
 
+    def ask_colour(self) -> None:
+        """Have the keyboard type the new colour."""
+        self.hex.setFocus()
+        self.hex.selectAll()
+
     def hold(self, place: Place) -> None:
         """Hold the colour of a pixel."""
         self.session.take("")

@@ -86,6 +86,7 @@ class Viewer(QWidget):
         self._resting.timeout.connect(self._read_around)
         self.on_pick: Any = None  #: called with a Place for a click or a box
         self.on_hold: Any = None  #: the same with Alt
+        self.on_picked: Any = None  #: called after a pick by keys alone
         self.on_area: Any = None  #: called with an Area for a stroke
         self.brush = BRUSH  #: half of its width, in pixels of the widget
         self.stroke: list[tuple[int, int]] = []  #: the frame's pixels that a stroke is drawn along

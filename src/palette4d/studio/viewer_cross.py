@@ -100,6 +100,8 @@ class Cross:
             act = viewer.on_hold if hold else viewer.on_pick
             if place is not None and act is not None:
                 act(place)
+                if viewer.session.place is not None and viewer.on_picked is not None:
+                    viewer.on_picked()
 
     def paint(self, painter: QPainter) -> None:
         """Draw it, seen on any picture."""

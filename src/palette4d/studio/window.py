@@ -101,6 +101,7 @@ class Window(QMainWindow):
         self.inspector = Inspector(session)
         self.viewer.on_pick, self.viewer.on_hold = self.inspector.pick, self.inspector.hold
         self.viewer.on_area = self.inspector.add_area
+        self.viewer.on_picked = self.inspector.ask_colour
         self.history = History(session)
         self.gallery = Gallery(session)
         self.files = FileMenu(self)
