@@ -498,3 +498,24 @@ def test_picks_are_undone_and_merged(plain: Path) -> None:
     found.forget_history()
     found.save()
     assert plain.read_bytes() == first
+
+
+def test_undo_of_a_rename_takes_no_version_away(plain: Path) -> None:
+    """Its old name has other edits now."""
+    document = Document.load(plain)
+    document.set("v1", rgb=(0.1, 0.1, 0.1))
+    document.save_version("warm")
+    document.change_version("warm", rename="cold")
+    cold = document.grade.of_version("cold")
+    document.set("v1", rgb=(0.7, 0.2, 0.6))
+    document.save_version("warm")
+    for _ in range(2):
+        document.undo()
+    assert document.grade.of_version("cold") == cold
+    assert set(document.grade.versions) == {"cold", "warm"}
+    document.redo()
+    assert document.grade.of_version("cold") == cold
+    # With its name free, it goes back.
+    document.undo()
+    document.remove_version("warm")
+    document.undo()

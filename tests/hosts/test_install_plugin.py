@@ -10,7 +10,6 @@ import shutil
 import stat
 import subprocess
 import sys
-import venv
 from pathlib import Path
 
 import access_lists
@@ -167,6 +166,7 @@ def test_root_installs_no_environment_of_another_users_python(
     """Its library lies elsewhere; so do modules that a file *.pth names."""
     theirs = tmp_path / "theirs"
     theirs.mkdir()
+    venv = pytest.importorskip("venv", reason="Windows' embedded Python has none")
     venv.create(tmp_path / "venv")
     monkeypatch.setattr(sys, "executable", str(tmp_path / "venv/bin/python"))
     (site,) = (tmp_path / "venv/lib").glob("*/site-packages")

@@ -1,7 +1,8 @@
 #include "convert/colour_spaces.hpp"
 
+#include <algorithm>
 #include <cctype>
-#include <sstream>
+#include <string_view>
 
 namespace palette4d {
 namespace {
@@ -137,13 +138,22 @@ std::string plain(const std::string& text) {
     return result;
 }
 
+/// Whether one of some names, which blanks part, is the wanted plain one. A stream would ask for
+/// the locale what a blank is, and in Windows' runtime library another one may free that answer.
+bool has_name(std::string_view names, const std::string& wanted) {
+    while (!names.empty()) {
+        const std::size_t end = std::min(names.find(' '), names.size());
+        if (plain(std::string(names.substr(0, end))) == wanted) return true;
+        names.remove_prefix(std::min(end + 1, names.size()));
+    }
+    return false;
+}
+
 const Space* space_of(const std::string& encoding) {
     const std::string wanted = plain(encoding);
     for (const Space& space : kSpaces) {
-        std::istringstream names(space.name ? space.name + (' ' + std::string(space.aliases))
-                                            : space.aliases);
-        for (std::string name; names >> name;) {
-            if (plain(name) == wanted) return &space;
+        if ((space.name && plain(space.name) == wanted) || has_name(space.aliases, wanted)) {
+            return &space;
         }
     }
     return nullptr;

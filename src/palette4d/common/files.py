@@ -89,7 +89,10 @@ def make_folder(folder: Path) -> None:
 
 def same_file(a: Path, b: Path) -> bool:
     """Return whether two paths lead to one file."""
-    return os.path.realpath(a) == os.path.realpath(b)
+    try:
+        return a.samefile(b)
+    except OSError:  # one is not there
+        return os.path.realpath(a) == os.path.realpath(b)
 
 
 def names_a_server(path: str, named_in: Path) -> bool:

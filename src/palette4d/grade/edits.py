@@ -142,10 +142,13 @@ class Edit:
     def apply(self, state: State) -> dict[Key, Any]:
         """Return the state after this edit; refuse a value that has changed since it was made."""
         result = dict(state)
+        # A name that has other edits now keeps them, and a version that cannot have it its own.
+        taken = [c for c in self.changes if c.kind == "version" and state.get(c.key) != c.before]
+        homeless = [change.after for change in taken if change.after is not None]
         for change in self.changes:
+            if change in taken or (change.kind == "version" and change.before in homeless):
+                continue
             if result.get(change.key) != change.before:
-                if change.kind == "version":
-                    continue  # the name has other edits now, which stay
                 what = _named(change.key)
                 raise Palette4dError(
                     f"{what} was changed meanwhile, so that the step "
