@@ -278,8 +278,12 @@ class _Versions(QListWidget):
 
     def event(self, event: QEvent) -> bool:
         """F2 renames here; else it is a key of the window."""
-        keys = isinstance(event, QKeyEvent) and event.type() == QEvent.Type.ShortcutOverride
-        if keys and event.key() == Qt.Key.Key_F2 and self.gallery.chosen:
+        if (
+            isinstance(event, QKeyEvent)
+            and event.type() == QEvent.Type.ShortcutOverride
+            and event.key() == Qt.Key.Key_F2
+            and self.gallery.chosen
+        ):
             event.accept()
             return True
         return super().event(event)
