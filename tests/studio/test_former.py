@@ -45,7 +45,7 @@ def former(sidecar: Path, again: bytes) -> Former:
     """A session whose sidecar was just analysed again."""
     session = Session()
     session.open_sidecar(sidecar)
-    former = Former(session)
+    former = Former(session, lambda: None)
     former.keep(sidecar)
     sidecar.write_bytes(again)
     session.open_sidecar(sidecar)

@@ -262,8 +262,10 @@ def test_undo_brings_back_the_palette_before_an_analysis(
     qtbot.waitUntil(lambda: not opened.verbs.dialogs, timeout=120_000)
     after = sidecar.read_bytes()
     assert after != before
+    opened.banner.tell("notes", "the palette is coarse", "warning", {})
     opened._do("undo")
     assert sidecar.read_bytes() == before
+    assert "notes" not in opened.banner.entries
     assert session.document is not None
     ids = session.document.grade.core.polytope.vertex_ids
     opened._do("redo")

@@ -1,6 +1,7 @@
 """The sidecar as it was before it was analysed again: undo brings it back. It knows no toolkit."""
 
 import contextlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,11 +26,18 @@ class Content:
 
 
 class Former:
-    """Undoes and redoes analyses that wrote the session's sidecar anew."""
+    """Undoes and redoes analyses that wrote the session's sidecar anew.
 
-    def __init__(self, session: Session) -> None:
+    Parameters
+    ----------
+    session : Session
+    changed : callable
+        Called when another analysis is there: what was noted is no longer true.
+    """
+
+    def __init__(self, session: Session, changed: Callable[[], object]) -> None:
         """Begin with no analysis."""
-        self.session = session
+        self.session, self._changed = session, changed
         self._now: tuple[Path, bytes] | None = None
         self._past: list[Content] = []
         self._future: list[Content] = []
@@ -101,4 +109,5 @@ class Former:
         self.session.revert()
         self.session.go(self.session.frame)
         other.append(Content(wanted.path, data, self._edits))
+        self._changed()
         self.session.say(said)

@@ -330,8 +330,12 @@ class VerbDialog(QDialog):
             self._done(self)
 
     def offer(self, advised: Sequence[str]) -> None:
-        """Show a button for each option that the messages advise, if it has a field here."""
-        for option in dict.fromkeys(advised):
+        """Show a button for each option that the messages advise, if it has a field here.
+
+        Those that leave nothing to be chosen come first.
+        """
+        at_once = [each for each in advised if each.partition(" ")[0] in RUN_AT_ONCE]
+        for option in dict.fromkeys([*at_once, *advised]):
             flag, _, value = option.partition(" ")
             for field, entry in zip(self.fields, self.inputs, strict=True):
                 if flag == field.flag or option in field.choices:

@@ -79,7 +79,7 @@ class VerbMenu:
     def __init__(self, window: "Window") -> None:
         self.window, self.session = window, window.session
         self.dialogs: list[VerbDialog] = []
-        self.former = Former(self.session)
+        self.former = Former(self.session, lambda: self.window.banner.drop("notes"))
 
     def _verb(
         self,
