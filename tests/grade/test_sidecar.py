@@ -229,6 +229,23 @@ def test_versions_without_an_edit_are_kept_and_not_lost_unasked(tmp_path: Path) 
     assert kept.history.undone == document.history.undone
 
 
+def test_undone_edits_are_kept_too(tmp_path: Path) -> None:
+    path = tmp_path / "clip.p4d.json"
+    sidecar.save(golden("split"), path)
+    document = Document.load(path)
+    document.set("v1", rgb=(0.7, 0.2, 0.6))
+    document.pick(5, colour=(0.5, 0.5, 0.5), by=(0.1, 0, 0), follow=False)
+    document.undo()
+    document.undo()
+    document.save()
+    before = path.read_bytes()
+    sidecar.save(golden("split"), path, on_edits="keep")
+    assert path.read_bytes() == before
+    kept = Document.load(path)
+    kept.redo()
+    assert kept.grade.colour("v1") == (0.7, 0.2, 0.6)
+
+
 def test_edits_are_dropped_on_request(edited: Path) -> None:
     sidecar.check_target(edited, on_edits="drop")
     sidecar.save(golden("split"), edited, on_edits="drop")

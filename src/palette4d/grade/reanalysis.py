@@ -60,9 +60,9 @@ def _copied(former: Grade, new: Grade) -> tuple[Grade, list[str]]:
     for name in former.versions:
         if (version := former.version(name)).edited:
             new, _ = copied(new, version, clip, same_clip=same)
-            new, _ = save_version(new, name)
-            new = set_note(new, name, former.note(name))
-            new = reset(new)
+        new, _ = save_version(new, name)
+        new = set_note(new, name, former.note(name))
+        new = reset(new)
     if former.edited:
         new, fit = copied(new, former, clip, same_clip=same)
         notes.append(f"the palette changed, so that the grade was copied: {fit}")

@@ -23,6 +23,8 @@ Saved = tuple[_core.Sidecar, Fields, bytes]
 OnEdits = Literal["refuse", "keep", "drop"]
 
 SCHEMA = "palette4d.sidecar"
+#: The members of steps, of the mattes that their picks name, and of the format that picks need.
+_HISTORY = ("version", "history", "mattes")
 
 
 def new_document(
@@ -153,6 +155,9 @@ def save(
             if on_edits == "refuse":
                 raise _would_lose(target, old[1])
             members = _with_edits_of(old[1], members, target)
+        elif old is not None and on_edits == "keep" and _is_new(members, old[1]):
+            # Undone edits alone: redo brings them back.
+            members |= {name: old[1][name] for name in _HISTORY if name in old[1]}
         core, data = _core.encode_sidecar(members, os.fspath(target))
         write(target, data, held, replaces=replaces)
     return core, members, data
@@ -222,6 +227,11 @@ def _lacks(document: Fields, old: Fields) -> bool:
     return gone or (has_edits(old) and old["edits"] != document.get("edits"))
 
 
+def _is_new(document: Fields, old: Fields) -> bool:
+    """Return whether a document is an analysis with an old one's palette, without any steps."""
+    return "history" not in document and same_palette(old, document)
+
+
 def _summary(document: Fields) -> str:
     vertices = counted(len(document["edits"]["vertices"]), "edited vertex", "edited vertices")
     stops = counted(len(document["edits"]["stops"]), "stop")
@@ -250,6 +260,6 @@ def _with_edits_of(old: Fields, new: Fields, target: Path) -> Fields:
             f"the new one, so they cannot be kept. Discard them with {Arg('on_edits', 'drop')}, or "
             "choose another output"
         )
-    names = ("edits", "mattes", "versions", "history")
+    names = ("edits", "versions", *_HISTORY)
     users = {name: old[name] for name in names if name in old}
     return {**new, **users, "extra": new.get("extra") or old["extra"]}
