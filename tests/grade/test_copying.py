@@ -176,6 +176,11 @@ def test_a_new_analysis_with_another_palette_gets_the_grade(tmp_path: Path) -> N
     document = graded()
     document.save_version("purple")
     document.adjust(by=(0, 0.1, 0))
+    own = Document(members("split"))
+    own.save_version("neutral")
+    document = Document(
+        {**document.fields(), "versions": own.fields()["versions"] + document.fields()["versions"]}
+    )
     document.save(path)
     read = path.read_bytes()
     fields = members("merge")
@@ -192,7 +197,8 @@ def test_a_new_analysis_with_another_palette_gets_the_grade(tmp_path: Path) -> N
     assert any("clip.former.p4d.json" in note for note in new.notes)
     found = Document.load(path)
     assert found.fields()["polytope"] == fields["polytope"]
-    assert found.grade.versions == ("purple",)
+    assert found.grade.versions == ("neutral", "purple")
+    assert not found.version("neutral").grade.edited
     assert found.grade.settings
     assert found.version("purple").grade.settings != found.grade.settings
     assert len(found.history.done) == 1
