@@ -230,6 +230,9 @@ def test_edits_are_offered_again_whatever_the_clocks_say(
     os.utime(first, (1, 1))
     assert recovered(sidecar) == second
     first.unlink()
+    first.symlink_to("gone")
+    assert recovered(sidecar) == second
+    first.unlink()
     for when in (1, time.time() + 600):
         os.utime(sidecar, (when, when))
         assert recovered(sidecar) == second

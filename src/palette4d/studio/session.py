@@ -507,12 +507,14 @@ def recovery_files(sidecar: Path) -> Iterator[Path]:
 
 def recovered(sidecar: Path) -> Path | None:
     """Return the newest edits of a sidecar that could not be saved."""
-    try:
+    kept: list[tuple[int, Path]] = []
+    with contextlib.suppress(OSError, RuntimeError):  # no such folder; a user without a home
         folder, name = _recovery(sidecar)
-        kept = [path for path in folder.iterdir() if path.name.startswith(f"{name}-")]
-        return max(kept, key=lambda path: path.stat().st_mtime_ns, default=None)
-    except (OSError, RuntimeError):  # no such folder; a user without a home
-        return None
+        for path in folder.glob(f"{name}-*"):
+            with contextlib.suppress(OSError):  # another session has saved it meanwhile
+                if path.is_file():
+                    kept.append((path.stat().st_mtime_ns, path))
+    return max(kept, default=(0, None))[1]
 
 
 def _recovery(sidecar: Path) -> tuple[Path, str]:
