@@ -10,8 +10,10 @@ look.
 """
 
 import copy
+import filecmp
+import glob
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -134,17 +136,24 @@ def write_config(
         _refuse_far(shot_names, between)
 
     make_folder(folder)
+    links = [
+        _links(name, format_, chosen, series.every(sidecar, 1))
+        for name, chosen, sidecar in zip(shot_names, frames, read, strict=True)
+    ]
     requests = []
-    for file, name, chosen in zip(sidecars, shot_names, frames, strict=True):
+    for k, (file, name, chosen) in enumerate(zip(sidecars, shot_names, frames, strict=True)):
         luts = own_folder(own_folder(folder / LUTS) / name)
-        _remove_links(luts)
+        _remove_links(luts, name, format_)
+        for link, target in links[k].items():
+            if (luts / link).exists() and not _is_copy(luts / link, luts / target):
+                refuse_existing(luts / link, force)
         requests.append(series.Request(file, luts, chosen, settings, name, 0, clip, force))
     baked = series.export(requests, workers, progress)
     _refuse_failed(shot_names, baked)
     shots = []
     for k, sidecar in enumerate(read):
         every = series.every(sidecar, 1)
-        _link(requests[k].folder, shot_names[k], format_, frames[k], every)
+        _link(requests[k].folder, links[k])
         ends = (every[0], every[-1])
         shots.append(Shot(shot_names[k], str(sidecars[k]), spaces[k], *ends, baked[k], between[k]))
 
@@ -238,29 +247,34 @@ def _refuse_far(names: list[str], between: list[BetweenError | None]) -> None:
         )
 
 
-def _remove_links(luts: Path) -> None:
+def _remove_links(luts: Path, name: str, format_: LutFormat) -> None:
     """Remove the links of an earlier config; its LUTs stay."""
     if luts.is_dir():
-        for entry in luts.iterdir():
+        for entry in luts.glob(f"{glob.escape(name)}.*{format_.extension}"):
             if entry.is_symlink():
                 entry.unlink()
 
 
-def _link(
-    luts: Path,
-    name: str,
-    format_: LutFormat,
-    baked: tuple[int, ...],
-    every: tuple[int, ...],
-) -> None:
-    """Give every frame a file: its own, or a link to the file of the nearest baked frame."""
+def _links(
+    name: str, format_: LutFormat, baked: tuple[int, ...], every: tuple[int, ...]
+) -> dict[str, str]:
+    """Return the files that are links, by name: of each frame to that of the nearest baked one."""
 
     def file(frame: object) -> str:
         return f"{name}.{frame}{format_.extension}"
 
     middle = min(baked, key=lambda f: (abs(2 * f - every[0] - every[-1]), f))
     links = {file(f): file(nearest(baked, f)) for f in every if nearest(baked, f) != f}
-    for link, target in {file(NO_FRAME): file(middle), **links}.items():
+    return {file(NO_FRAME): file(middle), **links}
+
+
+def _is_copy(file: Path, other: Path) -> bool:
+    """Return whether a file is a copy of another, which an earlier run made for want of links."""
+    return file.is_file() and other.is_file() and filecmp.cmp(file, other, shallow=False)
+
+
+def _link(luts: Path, links: Mapping[str, str]) -> None:
+    for link, target in links.items():
         place = luts / link
         try:
             replace_by_link(place, target)

@@ -213,6 +213,21 @@ def test_frames_between_take_the_nearest_table(shot: Path, tmp_path: Path) -> No
 
 
 @links
+def test_files_that_config_did_not_make_stay(shot: Path, tmp_path: Path) -> None:
+    tables = tmp_path / "show" / "luts" / "cube"
+    tables.mkdir(parents=True)
+    own, link = tables / "cube.7.clf", tables / "reference"
+    own.write_text("made by hand")
+    link.symlink_to("elsewhere")
+    with pytest.raises(Palette4dError, match=r"cube\.7\.clf: found a file there already"):
+        write_config([shot], tmp_path / "show", **options(4))
+    assert own.read_text() == "made by hand"
+    write_config([shot], tmp_path / "show", **options(4, force=True))
+    assert own.is_symlink()
+    assert link.readlink() == Path("elsewhere")
+
+
+@links
 def test_more_tables_replace_links(shot: Path, tmp_path: Path) -> None:
     write_config([shot], tmp_path / "show", **options(4))
     done = write_config([shot], tmp_path / "show", **options(2, force=True))

@@ -69,6 +69,48 @@ def test_an_analysis_is_undone_and_redone(former: Former, sidecar: Path, again: 
     assert sidecar.read_bytes() == again
 
 
+@pytest.mark.parametrize("whose", ["own", "another program's"])
+def test_edits_made_while_the_analysis_runs_come_back(
+    sidecar: Path, again: bytes, whose: str
+) -> None:
+    session = Session()
+    session.open_sidecar(sidecar)
+    former = Former(session, lambda: None)
+    former.keep(sidecar)
+    if whose == "own":
+        session.edit(lambda document: document.adjust(by=(0.05, 0, 0)))
+        session.edit(lambda document: document.save_version("meanwhile"))
+        assert session.save()
+    else:
+        another_program_edits(sidecar)
+        session.tick()
+    edited = sidecar.read_bytes()
+    sidecar.write_bytes(again)
+    session.tick()  # the new file may be seen before the analysis says that it is done
+    session.open_sidecar(sidecar)
+    former.written(sidecar)
+    former.undo()
+    assert sidecar.read_bytes() == edited
+
+
+def test_edits_that_an_analysis_dropped_come_back(sidecar: Path) -> None:
+    """Also where it found the same palette, and its file is seen before it says that it is done."""
+    analysed = sidecar.read_bytes()
+    session = Session()
+    session.open_sidecar(sidecar)
+    session.edit(lambda document: document.adjust(by=(0.05, 0, 0)))
+    assert session.save()
+    edited = sidecar.read_bytes()
+    former = Former(session, lambda: None)
+    former.keep(sidecar)
+    sidecar.write_bytes(analysed)
+    session.tick()
+    session.open_sidecar(sidecar)
+    former.written(sidecar)
+    former.undo()
+    assert sidecar.read_bytes() == edited
+
+
 def test_edits_of_another_program_are_undone_first(former: Former, sidecar: Path) -> None:
     before = former._past[0].data
     assert former.session.document

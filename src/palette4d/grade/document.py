@@ -662,6 +662,11 @@ class Document:
         self._saved(replace(grade, analysed=core), history, data)
 
 
+def content_of(document: Document) -> bytes | None:
+    """Return what a document's file had when it was read or written last."""
+    return None if document._file is None else document._file.data
+
+
 def put_back(document: Document, content: bytes) -> bytes:
     """Give a document's file an earlier content; return what it had. Load it again then.
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from palette4d.common.errors import Palette4dError
 from palette4d.common.json_files import UnusableFile, read_regular
-from palette4d.grade.document import put_back
+from palette4d.grade.document import content_of, put_back
 from palette4d.grade.edits import Edit, State
 from palette4d.studio import texts
 from palette4d.studio.session import Session
@@ -39,14 +39,30 @@ class Former:
         """Begin with no analysis."""
         self.session, self._changed = session, changed
         self._now: tuple[Path, bytes] | None = None
+        self._palette: object = None  #: of the document whose file an analysis will write
         self._past: list[Content] = []
         self._future: list[Content] = []
+        for event in ("document", "status"):  # after a save there is a new status
+            session.on(event, self._follow)
 
     def keep(self, path: Path) -> None:
         """Keep what a file has, before an analysis writes it."""
-        self._now = None
+        self._now, document = None, self.session.document
+        self._palette = None if document is None else document.grade.members["polytope"]
         with contextlib.suppress(OSError, UnusableFile):
             self._now = (path.absolute(), read_regular(path))
+
+    def _follow(self) -> None:
+        """Keep what the file gets by edits until the analysis writes it, which makes no steps."""
+        document = self.session.document
+        if self._now is None or document is None or document.path is None:
+            return
+        if not document.history.done:
+            return
+        (path, data), content = self._now, content_of(document)
+        own = document.path.absolute() == path and document.grade.members["polytope"]
+        if own and content and content != data and own == self._palette:
+            self._now = path, content
 
     def written(self, path: Path) -> None:
         """Let undo bring back what the file had; call it when the new one is open."""
