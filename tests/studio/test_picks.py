@@ -161,6 +161,9 @@ def test_bars_of_the_matte_show_live_and_are_one_step(qtbot: Any, opened: Window
         assert getattr(picks(opened)[0], name) == number
     qtbot.mouseClick(panel.whole_hue, LEFT, pos=QPoint(6, 6))
     qtbot.waitUntil(lambda: picks(opened)[0].whole_hue, timeout=20_000)
+    for toward in ("colour", "shift"):
+        qtbot.mouseClick(panel.steady, LEFT, pos=QPoint(6, 6))
+        assert picks(opened)[0].toward == toward
     assert picks(opened)[0].matte is None
 
 

@@ -193,7 +193,11 @@ class PickPanel(QWidget):
         self.whole_hue = QCheckBox(texts.WHOLE_HUE)
         self.whole_hue.setToolTip(texts.WHOLE_HUE_TIP)
         self.whole_hue.clicked.connect(self._toggled)
-        self.window_rows = WindowRows(self.session, grid, 3, self.whole_hue)
+        self.steady = QCheckBox(texts.SAME_COLOUR)
+        self.steady.setToolTip(texts.SAME_COLOUR_TIP)
+        self.steady.clicked.connect(self._steadied)
+        grid.addWidget(self.steady, 3, 0, 1, 3)
+        self.window_rows = WindowRows(self.session, grid, 4, self.whole_hue)
         grid.setColumnStretch(1, 1)
 
     # ------------------------------------------------------------------------------ what it shows
@@ -222,6 +226,7 @@ class PickPanel(QWidget):
         for name, box in self.boxes.items():
             box.show_number(getattr(pick, name))
         self.whole_hue.setChecked(pick.whole_hue)
+        self.steady.setChecked(pick.toward == "colour")
 
     def _show_tool(self) -> None:
         self.add.setChecked(self.session.tool == "add")
@@ -249,6 +254,12 @@ class PickPanel(QWidget):
         if pick is not None:
             said = texts.ITS_HUE if on else texts.ITS_COLOURS
             grade_steps.change_pick(self.session, pick.id, said, whole_hue=on)
+
+    def _steadied(self, on: bool) -> None:
+        pick = self.session.picked
+        if pick is not None:
+            said, toward = (texts.SAME_EVERYWHERE, "colour") if on else (texts.SAME_SHIFT, "shift")
+            grade_steps.change_pick(self.session, pick.id, said, toward=toward)
 
     def _do(self, k: int) -> None:
         """Do what a note of the answer proposes."""
