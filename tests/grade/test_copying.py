@@ -185,6 +185,7 @@ def test_a_new_analysis_with_another_palette_gets_the_grade(tmp_path: Path) -> N
     read = path.read_bytes()
     fields = members("merge")
     fields["edits"] = {"vertices": [], "stops": []}
+    (tmp_path / "clip.former.p4d.json").mkdir()  # a name that is taken
     for on_edits in ("refuse", "keep"):
         new = Document(fields)
         if on_edits == "refuse":
@@ -193,8 +194,8 @@ def test_a_new_analysis_with_another_palette_gets_the_grade(tmp_path: Path) -> N
             assert path.read_bytes() == read
         else:
             new.save(path, on_edits="keep")
-    assert (tmp_path / "clip.former.p4d.json").read_bytes() == read
-    assert any("clip.former.p4d.json" in note for note in new.notes)
+    assert (tmp_path / "clip.former2.p4d.json").read_bytes() == read
+    assert any("clip.former2.p4d.json" in note for note in new.notes)
     found = Document.load(path)
     assert found.fields()["polytope"] == fields["polytope"]
     assert found.grade.versions == ("neutral", "purple")
@@ -204,10 +205,10 @@ def test_a_new_analysis_with_another_palette_gets_the_grade(tmp_path: Path) -> N
     assert len(found.history.done) == 1
     again = Document(members("split"))
     again.save(path, on_edits="keep")
-    assert (tmp_path / "clip.former2.p4d.json").exists()
+    assert (tmp_path / "clip.former3.p4d.json").exists()
     path.write_bytes(read)  # as a run leaves it that was killed after it had kept the old file
     Document(fields).save(path, on_edits="keep")
-    assert not (tmp_path / "clip.former3.p4d.json").exists()
+    assert not (tmp_path / "clip.former4.p4d.json").exists()
 
 
 def test_a_new_analysis_does_not_replace_what_another_program_writes_meanwhile(

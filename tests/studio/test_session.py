@@ -240,6 +240,29 @@ def test_edits_are_offered_again_whatever_the_clocks_say(
     assert recovered(sidecar) is None
 
 
+def test_edits_are_offered_again_when_a_disk_that_went_comes_back(
+    sidecar: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A link on it led to the sidecar; without it nobody knows where to."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    disk = tmp_path / "disk"
+    (disk / "v012").mkdir(parents=True)
+    shutil.copy(sidecar, disk / "v012" / "a.p4d.json")
+    (disk / "current").symlink_to("v012")
+    session = Session()
+    session.open_sidecar(disk / "current" / "a.p4d.json")
+    disk.rename(tmp_path / "away")
+    session.edit(lambda document: document.set(vertex(sidecar), rgb=(1.0, 0.0, 0.0)))
+    assert not session.save()
+    (tmp_path / "away").rename(disk)
+    copy = recovered(disk / "current" / "a.p4d.json")
+    assert copy is not None
+    assert recovered(disk / "v012" / "a.p4d.json") == copy
+    # Saved as the very file that the message names, it stays.
+    assert session.save_as(copy)
+    assert palette4d.load(copy).grade.colour(vertex(sidecar)) == (1.0, 0.0, 0.0)
+
+
 def test_whatever_a_save_fails_with_the_edits_are_kept(
     session: Session, sidecar: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

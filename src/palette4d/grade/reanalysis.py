@@ -1,6 +1,7 @@
 """A new analysis that replaces an old sidecar: edits are kept, moved or copied."""
 
 import itertools
+import os
 from pathlib import Path
 from typing import Any
 
@@ -96,4 +97,8 @@ def _former(target: Path, content: bytes) -> Path:
     stem = target.name.removesuffix(".p4d.json")
     names = itertools.chain(["former"], (f"former{number}" for number in itertools.count(2)))
     paths = (target.with_name(f"{stem}.{name}.p4d.json") for name in names)
-    return next(p for p in paths if not p.exists() or sidecar.read_bytes(p) == content)
+    return next(p for p in paths if not os.path.lexists(p) or _has(p, content))
+
+
+def _has(path: Path, content: bytes) -> bool:
+    return path.is_file() and not path.is_symlink() and sidecar.read_bytes(path) == content

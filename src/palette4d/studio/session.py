@@ -67,6 +67,7 @@ class Session(Drafts):
         self._trial: Document | None = None
         self._dragged: tuple[Edit, str] | None = None
         self._copy: Path | None = None  # has the edits that could not be saved
+        self._real = Path()  # where links led when the file was opened: its disk may go
         self._stamp: tuple[int, int, int] | None = None
         self._edited_at: float | None = None  # the first edit that is not on disk
         self._last_edit = self._next_try = 0.0
@@ -109,7 +110,7 @@ class Session(Drafts):
         self._leave()
         if own is not None and same_file(own, Path(path)):
             document = Document.load(path)  # with the edits that were saved just now
-        self._document = document
+        self._document, self._real = document, Path(os.path.realpath(path))
         self._stamp = _stamp(Path(path))
         first, last, step = document.grade.frames
         self.frame = first + (last - first) // (2 * step) * step
@@ -430,8 +431,7 @@ class Session(Drafts):
         assert self._document is not None
         assert self._document.path is not None
         try:
-            path = self._document.path
-            copy = self._copy or next(p for p in recovery_files(path) if not p.exists())
+            copy = self._copy or next(p for p in recovery_files(self._real) if not p.exists())
             copy.parent.mkdir(parents=True, exist_ok=True)
             self._elsewhere(self._document).save(copy, on_edits="drop")
             self._copy = copy
@@ -469,7 +469,9 @@ class Session(Drafts):
             return False
         self._document, self._trial, self._dragged = loaded, None, None
         self._edited_at, self._stamp = None, _stamp(Path(path))
-        self._drop_copy()
+        if self._copy is not None and not same_file(self._copy, Path(path)):
+            self._drop_copy()
+        self._copy, self._real = None, Path(os.path.realpath(path))
         self.say(texts.SAVED_AS.format(name=Path(path).name))
         self._changed()
         return True
