@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 LEAVES = """
-import ctypes, os, sys, threading, time, types
+import os, sys, threading, time, types
 import numpy as np
 from palette4d import _core
 
@@ -18,8 +18,8 @@ def work():
         _core.scope_counts(picture)
 
 class Late:  # Python removes it after it has ended the interpreter
-    def __del__(self, sleep=ctypes.CDLL(None).usleep, write=os.write):
-        sleep(500_000)
+    def __del__(self, sleep=time.sleep, write=os.write):
+        sleep(0.5)
         write(1, b"left")
 
 sys.modules["late"] = types.ModuleType("late")

@@ -24,6 +24,8 @@ def wine(
     program: str, *words: str | Path, cwd: Path, timeout: int = 600
 ) -> subprocess.CompletedProcess[str]:
     """Run a program of the folder; its output goes through a pipe, since Wine writes to no file."""
+    # Wine removes what links lead to: no temporary folder of Linux is pytest's there.
+    own = {name: value for name, value in os.environ.items() if name != "PYTEST_DEBUG_TEMPROOT"}
     environment = {
         "WINEPREFIX": str(Path(GIVEN) / "wine"),
         "WINEDEBUG": "-all",
@@ -35,7 +37,7 @@ def wine(
     return subprocess.run(
         ["wine", FOLDER / program, *words],
         cwd=cwd,
-        env={**os.environ, **environment},
+        env={**own, **environment},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
