@@ -35,7 +35,7 @@ time.sleep(0.2)
 """
 
 
-@pytest.mark.skipif(os.name == "nt", reason="there a thread that Python ends unwinds no stack")
+@pytest.mark.skipif(os.name == "nt", reason="glibc alone unwinds a thread that Python ends")
 def test_a_program_may_end_while_a_daemon_thread_is_in_the_core(tmp_path: Path) -> None:
     left = tmp_path / "left"
     done = subprocess.run(

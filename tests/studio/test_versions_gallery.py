@@ -157,9 +157,11 @@ def test_a_version_stays_selected_under_its_new_name(
 def test_a_name_that_another_version_has_is_refused(
     gallery: Gallery, opened: Window, qtbot: Any
 ) -> None:
+    choose(gallery, 0)
     gallery.list.item(0).setText("B")
     qtbot.waitUntil(lambda: names(gallery) == ["A", "B"])
     assert opened.session.status.level == "error"
+    assert gallery.chosen == ["A"]
 
 
 def test_a_note_stands_below_the_name(gallery: Gallery, opened: Window) -> None:

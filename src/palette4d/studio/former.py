@@ -57,11 +57,10 @@ class Former:
         document = self.session.document
         if self._now is None or document is None or document.path is None:
             return
-        if not document.history.done:
-            return
         (path, data), content = self._now, content_of(document)
-        own = document.path.absolute() == path and document.grade.members["polytope"]
-        if own and content and content != data and own == self._palette:
+        if content is None or content == data or document.path.absolute() != path:
+            return
+        if document.history.done and document.grade.members["polytope"] == self._palette:
             self._now = path, content
 
     def written(self, path: Path) -> None:

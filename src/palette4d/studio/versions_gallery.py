@@ -198,8 +198,9 @@ class Gallery(QWidget):
     def _rename(self, old: str, new: str) -> None:
         grade_steps.rename_version(self.session, old, new)
         self.refresh()
+        now = old if old in self.session.versions else new  # it may have been refused
         for k in range(self.list.count()):  # its place has changed with its name
-            self.list.item(k).setSelected(self.list.item(k).data(NAME) == new)
+            self.list.item(k).setSelected(self.list.item(k).data(NAME) == now)
 
     def _note_typed(self) -> None:
         chosen = self.chosen
