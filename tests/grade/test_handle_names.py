@@ -81,6 +81,16 @@ def test_a_fork_between_tracks_is_called_by_what_it_comes_from_and_becomes() -> 
     handles = Handles(fields)
     tracks = tracks_of(handles, {"v1": "red", "v2": "red", "v3": "green", "v4": "green"})
     assert [track.called for track in tracks] == ["red, 0-9", "green, 0-9", "red > green, 0-9"]
+    # Between tracks of one colour it gets the next number.
+    fields["edges"] = [{"id": "e4", "from": "v3", "to": "v2"}, *fields["edges"]]
+    handles = Handles(fields)
+    tracks = tracks_of(handles, {"v1": "red 1", "v2": "red 1", "v3": "red 2", "v4": "red 2"})
+    assert {track.edges[0]: track.called for track in tracks} == {
+        "e1": "red 1, 0-9",
+        "e2": "red 2, 0-9",
+        "e4": "red 3, 0-9",
+        "e3": "red 4, 0-9",
+    }
 
 
 def test_names_are_of_the_unedited_colours_and_at_whole_frames() -> None:
@@ -91,6 +101,8 @@ def test_names_are_of_the_unedited_colours_and_at_whole_frames() -> None:
     assert len(set(tracks)) == len(tracks)
     document.set("v1", rgb=(1, 0, 0))
     assert (document.grade.names, [t.called for t in document.grade.tracks]) == (names, tracks)
+    stop = document.stop("e13", frame=9.75, rgb=(1, 0, 0))
+    assert document.grade.names[stop] == "blue, 10"
 
 
 def test_a_stop_has_the_name_of_the_nearer_end() -> None:

@@ -7,7 +7,7 @@ the chain; every other edge begins or ends another chain.
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,13 +34,14 @@ class Chain:
 def _continuations(
     frames: F64, rgb: F64, edges: Sequence[tuple[int, int]]
 ) -> tuple[dict[int, int], list[int]]:
-    """Return the next edge of each edge's chain, and the edge of each vertex (-1: none)."""
+    """Return the next edge of each edge's chain, and the edge of each vertex (-1: none).
 
-    def change(edge: int) -> tuple[float, float, int]:
+    The edge with the least change of colour continues.
+    """
+
+    def change(edge: int) -> tuple[float, int]:
         start, end = edges[edge]
-        # The edge with the least change of colour continues; the longer edge breaks ties.
-        length = float(frames[end] - frames[start])
-        return float(np.linalg.norm(rgb[end] - rgb[start])), -length, edge
+        return float(np.linalg.norm(rgb[end] - rgb[start])), edge
 
     follows: dict[int, int] = {}
     home = []
@@ -170,7 +171,6 @@ def tracks_of(handles: Handles, colours: Mapping[str, str]) -> list[Track]:
     labels = [plain(name).removeprefix("pale ").removeprefix("light ") for name in names]
     place = {id_: index for index, id_ in enumerate(ids)}
     tracks: list[Track] = []
-    taken: dict[str, int] = {}
     for chain in chains_of(handles.vertices.values(), handles.edges.values()):
         shown = list(chain.vertices)
         if not shown:  # a fork between two other tracks
@@ -191,14 +191,26 @@ def tracks_of(handles: Handles, colours: Mapping[str, str]) -> list[Track]:
             ends[1] = max(frames[chain.vertices[-1]], math.ceil(chain.last) - 1)
         span = "-".join(dict.fromkeys(str(round(time)) for time in ends))
         called = f"{colour}, {span}"
-        taken[called] = taken.get(called, 0) + 1
-        if taken[called] > 1:
-            called = f"{plain(colour)} {taken[called]}, {span}"
         vertices = tuple(ids[vertex] for vertex in chain.vertices)
         edges = tuple(edge_ids[edge] for edge in chain.edges)
         name = (vertices or edges)[0]
         tracks.append(Track(name, called, frame, chain.first, chain.last, vertices, edges))
-    return tracks
+    return _numbered(tracks)
+
+
+def _numbered(tracks: Sequence[Track]) -> list[Track]:
+    """Return tracks with numbers of their own where two have one name: forks after the others."""
+    taken, last, called = set[str](), dict[str, int](), dict[str, str]()
+    for track in sorted(tracks, key=lambda track: not track.vertices):
+        new, number = track.called, last.get(track.called, 1)
+        colour, span = new.rsplit(", ", 1)
+        while new in taken:
+            number += 1
+            new = f"{plain(colour)} {number}, {span}"
+        last[track.called] = number
+        taken.add(new)
+        called[track.name] = new
+    return [replace(track, called=called[track.name]) for track in tracks]
 
 
 def way_of(handles: Handles, id_: str) -> tuple[set[str], set[str]]:
