@@ -50,9 +50,11 @@ def answer(document: Document, pixel: tuple[float, float] = (40.0, 60.0)) -> Ans
     return found
 
 
-def test_one_thing_needs_no_help(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("strap", [0, 6])
+def test_one_thing_needs_no_help(monkeypatch: pytest.MonkeyPatch, strap: int) -> None:
     picture = np.tile(GREY, (H, W, 1))
-    picture[30:90, 20:60] = RED
+    picture[30:90, 20 : 60 + strap] = RED
+    picture[30:90, 50 : 50 + strap] = GREY
     found = answer(document_of(monkeypatch, picture))
     assert found.share == pytest.approx(0.1, abs=0.01)
     assert found.notes == ()
@@ -67,6 +69,21 @@ def test_a_range_without_the_picks_frame_takes_as_much_of_it(
     found = answer(document)
     document.change_pick("p1", start=2, until=3)
     assert again(document) == found
+
+
+@pytest.mark.parametrize(("size", "box"), [(1, 15), (5, 30)])
+def test_another_thing_of_its_colour_is_shown_in_pixels_of_the_clip(
+    monkeypatch: pytest.MonkeyPatch, size: int, box: int
+) -> None:
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = picture[30:90, 140:180] = RED
+    large = picture.repeat(size, axis=0).repeat(size, axis=1)
+    found = answer(document_of(monkeypatch, large), (40.0 * size, 60.0 * size))
+    also = note(found, "elsewhere")
+    assert also is not None
+    assert also.place is not None
+    assert also.place.pixel == pytest.approx((160 * size, 60 * size), abs=15 * size)
+    assert also.place.box == box
 
 
 def test_a_proposed_hold_keeps_the_other_thing(monkeypatch: pytest.MonkeyPatch) -> None:

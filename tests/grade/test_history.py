@@ -193,7 +193,9 @@ def test_a_history_that_does_not_fit_changes_nothing(plain: Path) -> None:
 def test_versions(plain: Path) -> None:
     document = Document.load(plain)
     document.set("v1", rgb=(1, 0, 0))
+    document.lock("v1")
     document.save_version("red")
+    document.lock("v1", locked=False)
     document.set("v1", rgb=(0, 0, 1))
     document.save_version("blue")
     document.save()
@@ -202,6 +204,7 @@ def test_versions(plain: Path) -> None:
     assert document.grade.same_edits == ("blue",)
     assert document.use_version("red") is None
     assert document.grade.colour("v1") == (1, 0, 0)
+    assert document.grade.locks == ("v1",)
     document.set("v2", rgb=(0, 1, 0))
     assert document.use_version("blue") == "before blue"
     document.set("v3", rgb=(0, 1, 0))

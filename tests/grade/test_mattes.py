@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 import palette4d
 from palette4d import _core
+from palette4d.colour.difference import viewing_of
 from palette4d.common.errors import Palette4dError
 from palette4d.grade import mattes
 from palette4d.grade.clip_of_picks import ClipOfPicks
@@ -243,6 +244,11 @@ def test_other_encodings_lead_to_display_code_values(encoding: str) -> None:
     assert start == 0 < end
     assert min(np.diff(values)) >= 0
     assert values[-1] >= 0.99
+    exact, codes = viewing_of(encoding).to_srgb, np.random.default_rng(0).uniform(start, end, 500)
+    assert exact is not None
+    shown = np.asarray(exact(np.repeat(codes[:, None], 3, axis=1)))[:, 1].clip(0)
+    found = np.interp(codes, np.linspace(start, end, len(values)), values)
+    assert found == pytest.approx(shown, abs=1 / 255)
 
 
 def test_a_log_clip_is_told_apart_as_its_picture_is(pictures: F32) -> None:

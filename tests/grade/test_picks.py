@@ -121,8 +121,11 @@ def test_another_pixel_without_a_box_is_that_pixel(monkeypatch: pytest.MonkeyPat
     assert (pick.box, pick.rgb) == (1, pytest.approx((0.8, 0.3, 0.2), abs=0.04))
     # Another palette takes the pick over with its box.
     pick = document.change_pick("p1", pixel=(20, 10), box=5)
-    taken, _ = pick_edits.taken(document.grade, ClipOfPicks.of(document.grade), [pick])
-    assert taken.pick("p1").rgb == pick.rgb == pytest.approx((0.4, 0.4, 0.4), abs=0.04)
+    other = replace(pick, rgb=(0, 0, 0), path=())
+    grade, _ = pick_edits.taken(document.grade, ClipOfPicks.of(document.grade), [other])
+    taken = grade.pick("p1")
+    assert (taken.rgb, taken.path) == (pick.rgb, pick.path)
+    assert taken.rgb == pytest.approx((0.4, 0.4, 0.4), abs=0.04)
 
 
 def moving(monkeypatch: pytest.MonkeyPatch, frames: int = 6) -> Document:
@@ -180,6 +183,10 @@ def test_a_window_follows_its_thing(monkeypatch: pytest.MonkeyPatch) -> None:
     pick = document.set_window("p1", 0, BOX, follow=False)
     assert pick.window == Window(2.8, (WindowKey(0, BOX, True),))
     assert document.change_pick("p1", follow=True).window != pick.window
+    window = document.set_window("p1", 2, (20, 16, 48, 44), follow=False).window
+    assert window is not None
+    assert [key.frame for key in window.keys] == [0, 2]
+    document.undo()
     assert document.change_pick("p1", follow=False).window == pick.window
 
 
