@@ -40,7 +40,13 @@ from palette4d.colour.ocio_config import BUILT_IN, config_of, failures
 from palette4d.common import sandbox
 from palette4d.common.child import Child
 from palette4d.common.errors import Arg, Palette4dError
-from palette4d.common.files import make_folder, refuse_existing, replace_by_link, replacing
+from palette4d.common.files import (
+    make_folder,
+    refuse_existing,
+    replace_by_link,
+    replacing,
+    temporary_folder,
+)
 from palette4d.common.text import checked_name, counted, file_safe
 from palette4d.jobs.workers import Workers
 from palette4d.media.clip_files import files_of_sidecar
@@ -143,7 +149,12 @@ def write_config(
     requests = []
     for k, (file, name, chosen) in enumerate(zip(sidecars, shot_names, frames, strict=True)):
         luts = own_folder(own_folder(folder / LUTS) / name)
-        _remove_links(luts, name, format_)
+        baked_now = {f"{name}.{frame}{format_.extension}" for frame in chosen}
+        for link in _old_links(luts, name, format_):
+            if not path.exists():
+                link.unlink()
+            elif link.name in baked_now:
+                _part(link)
         for link, target in links[k].items():
             if (luts / link).exists() and not _is_copy(luts / link, luts / target):
                 refuse_existing(luts / link, force)
@@ -154,6 +165,9 @@ def write_config(
     for k, sidecar in enumerate(read):
         every = series.every(sidecar, 1)
         _link(requests[k].folder, links[k])
+        for link in _old_links(requests[k].folder, shot_names[k], format_):
+            if link.name not in links[k]:
+                link.unlink()
         ends = (every[0], every[-1])
         shots.append(Shot(shot_names[k], str(sidecars[k]), spaces[k], *ends, baked[k], between[k]))
 
@@ -247,12 +261,22 @@ def _refuse_far(names: list[str], between: list[BetweenError | None]) -> None:
         )
 
 
-def _remove_links(luts: Path, name: str, format_: LutFormat) -> None:
-    """Remove the links of an earlier config; its LUTs stay."""
-    if luts.is_dir():
-        for entry in luts.glob(f"{glob.escape(name)}.*{format_.extension}"):
-            if entry.is_symlink():
-                entry.unlink()
+def _old_links(luts: Path, name: str, format_: LutFormat) -> list[Path]:
+    """Return the links of a shot's looks."""
+    if not luts.is_dir():
+        return []
+    entries = luts.glob(f"{glob.escape(name)}.*{format_.extension}")
+    return [entry for entry in entries if entry.is_symlink()]
+
+
+def _part(link: Path) -> None:
+    """Make a link a file of its own: the earlier config shows the same until a look replaces it."""
+    if not link.exists():
+        link.unlink()
+        return
+    with temporary_folder(link.parent) as temporary:
+        shutil.copyfile(link, temporary / link.name)
+        (temporary / link.name).replace(link)
 
 
 def _links(

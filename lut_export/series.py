@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.lut_export.bake import bake, check_settings, check_target
+from palette4d.lut_export.bake import SidecarBytes, bake, check_settings, check_target
 from palette4d.lut_export.formats import format_named
 from palette4d.lut_export.frame_edit import frame_text
 from palette4d.lut_export.measured_write import BakeSettings
@@ -39,6 +39,7 @@ from palette4d.common.arguments import frames_between
 from palette4d.common.errors import Arg, Palette4dError, WriteError
 from palette4d.common.files import make_folder, replacing, temporary_folder
 from palette4d.common.text import checked_name, file_safe
+from palette4d.grade.sidecar import read_bytes
 from palette4d.jobs.workers import Failed, Workers
 from palette4d.media.clip_files import files_of_sidecar
 
@@ -101,7 +102,7 @@ class Series:
 class FrameTask:
     """One file to bake; can be sent to another process or machine."""
 
-    sidecar: Path
+    sidecar: SidecarBytes
     frame: int
     file: str
     settings: BakeSettings
@@ -289,7 +290,8 @@ class _Export:
     def __init__(self, request: Request) -> None:
         """Check the request before the first frame is baked."""
         self.request, settings = request, request.settings
-        sidecar = _core.read_sidecar(str(request.sidecar))
+        data = read_bytes(request.sidecar)
+        sidecar = _core.parse_sidecar(data, str(request.sidecar))
         assert settings.format is not None
         format_ = format_named(settings.format)
         frames = check_frames(sidecar, request.frames)
@@ -297,7 +299,7 @@ class _Export:
             check_settings(settings, format_, sidecar, frame)
         name = checked_name(request.name) if request.name else file_safe(sidecar.clip["name"])
         self.index = request.folder / f"{name}.series.json"
-        self.header = header_of(sidecar, request.sidecar, settings)
+        self.header = header_of(sidecar, request.sidecar.name, data, settings)
         known = read_index(self.index, self.header, request.force)
         names = {f: file_name(name, f, request.padding, format_.extension) for f in frames}
         self.kept = [f for f in frames if _matches(request.folder / names[f], known.get(f))]
@@ -307,11 +309,11 @@ class _Export:
             if target.exists():
                 # A file without an entry may match: a killed export may have left it.
                 check_target(target, request.force or frame not in known, request.sidecar)
-        # Absolute: other processes may have another working folder.
+        # Absolute: other processes may have another working folder. All bake the grade of now.
         clip = None if request.clip is None else str(Path.cwd() / request.clip)
         settings = replace(settings, ocio_config=from_anywhere(settings.ocio_config))
-        path = request.sidecar.absolute()
-        self.tasks = {f: FrameTask(path, f, names[f], settings, clip) for f in todo}
+        read = SidecarBytes(request.sidecar.absolute(), data)
+        self.tasks = {f: FrameTask(read, f, names[f], settings, clip) for f in todo}
         self.entries = {f: entry for f, entry in known.items() if f not in self.tasks}
         self.baked: list[int] = []
         self.failed: dict[int, str] = {}

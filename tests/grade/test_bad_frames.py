@@ -217,6 +217,12 @@ class TestAgain:
         assert any("3 damaged" in note for note in done.notes)
         assert (tmp_path / f"o.1.{extension}").stat().st_size == len(whole)  # EXR has its time
         assert render(sidecar, clip, out, skip_existing=True, **NONE).frames == []
+        if os.name != "nt":  # an earlier grade comes back with its time
+            earlier = tmp_path / "earlier.p4d.json"
+            earlier.write_bytes(PLAIN.read_bytes())
+            os.utime(earlier, (0, 0))
+            earlier.replace(sidecar)
+            assert render(sidecar, clip, out, skip_existing=True, **NONE).frames == [1, 2, 3, 4]
         later = (tmp_path / f"o.2.{extension}").stat().st_mtime + 10
         os.utime(sidecar, (later, later))
         assert render(sidecar, clip, out, skip_existing=True, **NONE).frames == [1, 2, 3, 4]

@@ -290,7 +290,7 @@ def test_a_failed_rename_puts_the_old_bundle_back(
     rename = Path.rename
 
     def fail_on_the_fresh_one(self: Path, target: Path) -> Path:
-        if self.name == BUNDLE and self.parent.name.endswith(".p4d-tmp"):
+        if self.name != "old" and self.parent.name.endswith(".p4d-tmp"):
             raise OSError(28, "No space left on device")
         return rename(self, target)
 
@@ -320,7 +320,8 @@ def test_the_next_run_removes_what_a_killed_one_left(bundle: Path, tmp_path: Pat
 
     assert install("killed") == -9
     (left,) = destination.iterdir()
-    assert (left / BUNDLE).is_dir()
+    # Hosts look for bundles in hidden folders too, by their names.
+    assert [path.suffix for path in left.iterdir()] == [""]
     with temporary_folder(destination) as used:  # by a run that goes on
         assert [path.name for path in destination.iterdir()] == [used.name]
         assert install("whole") == 0

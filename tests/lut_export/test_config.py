@@ -238,6 +238,29 @@ def test_more_tables_replace_links(shot: Path, tmp_path: Path) -> None:
     assert len(list(tables.glob("*.clf"))) == 12  # 0 to 10, and the default
 
 
+@links
+def test_the_earlier_config_works_where_a_new_one_fails(shot: Path, tmp_path: Path) -> None:
+    done = write_config([shot], tmp_path / "show", **options(4))
+    frames = ["default", *map(str, range(11))]
+    before = [shown(done.path, {"FRAME": frame}, look("cube")) for frame in frames]
+
+    def interrupt(*_: int) -> None:
+        raise KeyboardInterrupt
+
+    for every in (2, 5):
+        with pytest.raises(KeyboardInterrupt):
+            write_config(
+                [shot], tmp_path / "show", **options(every, force=True), progress=interrupt
+            )
+        after = [shown(done.path, {"FRAME": frame}, look("cube")) for frame in frames]
+        # Looks that were baked before the end are the new ones already.
+        same = [np.array_equal(*pair) for pair in zip(before, after, strict=True)]
+        assert sum(same) >= len(frames) - 2
+    write_config([shot], tmp_path / "show", **options(10, force=True))
+    names = {p.name: p.is_symlink() for p in (tmp_path / "show/luts/cube").glob("*.clf")}
+    assert [names[f"cube.{frame}.clf"] for frame in (0, 1, 9)] == [False, True, True]
+
+
 class TestBase:
     def own(self, tmp_path: Path, *, environment: bool = False, files: str = "files") -> Path:
         """A small config with a file of its own in a search path."""

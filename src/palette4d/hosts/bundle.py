@@ -99,17 +99,17 @@ def install_bundle(
                 f"{target}: found something that is not an OpenFX bundle of Palette4D, "
                 f"expected nothing or an earlier version; replace it with {Arg('force', True)}"
             )
-        # Beside the target, so that the rename stays on one file system.
+        # Beside the target, so that the rename stays on one file system. Not by the name of a
+        # bundle: hosts look for that in hidden folders too, and would load half a library.
         with temporary_folder(destination) as temporary:
-            fresh = temporary / BUNDLE
+            fresh = temporary / "new"
             if link:
                 fresh.symlink_to(bundle, target_is_directory=True)
                 # Another's installation may be closed: then the node says what its buttons need.
                 with contextlib.suppress(WriteError):
                     _write_program(bundle)
             else:
-                # Bytes alone: modes are set below, and Wine lacks Windows' own copying.
-                shutil.copytree(bundle, fresh, copy_function=shutil.copyfile)
+                shutil.copytree(bundle, fresh, copy_function=_copy)
                 _write_program(fresh)
                 _open_for_all(fresh)
             _replace(fresh, target, temporary / "old")
@@ -134,6 +134,13 @@ def install_bundle(
             f"{Arg('dest')}"
         ) from error
     return target
+
+
+def _copy(source: str, target: str) -> None:
+    """Copy a file's bytes to the disk: modes are set later, and Wine lacks Windows' own copying."""
+    shutil.copyfile(source, target)
+    with Path(target).open("rb+") as file:
+        os.fsync(file.fileno())
 
 
 def _reason(error: OSError) -> str:

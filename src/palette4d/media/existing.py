@@ -12,10 +12,14 @@ from palette4d.media.exr_around import has_every_block
 
 
 def is_older(path: Path, sidecar: Path | None) -> bool:
-    """Whether a file was written before the sidecar was saved."""
+    """Whether a file was written before the sidecar was saved, or put there.
+
+    A copy or another name may bring an earlier time of saving with it.
+    """
     if sidecar is None or not sidecar.is_file():
         return False
-    return path.stat().st_mtime < sidecar.stat().st_mtime
+    about = sidecar.stat()
+    return path.stat().st_mtime < max(about.st_mtime, about.st_ctime)
 
 
 def is_whole_frame(path: Path, size: tuple[int, int]) -> bool:
