@@ -109,3 +109,17 @@ def test_what_is_refused_before_anything_is_baked(show: Path, tmp_path: Path) ->
     with pytest.raises(Palette4dError, match=r"edl=… expects those of an EDL"):
         export(other, tmp_path / "cdls", every=1, format="ccc", edl=tmp_path / "x.edl")
     assert not (tmp_path / "cdls").exists()
+
+
+@pytest.mark.parametrize("kind", ["edl", "otio"])
+def test_an_edit_that_changes_meanwhile(show: Path, tmp_path: Path, kind: str) -> None:
+    def cut(*_: int) -> None:
+        text = EDL.replace("one.mov", "1.mov").replace("two.mov", "one.mov")
+        (tmp_path / "cut.edl").write_bytes(text.replace("1.mov", "two.mov").encode("latin-1"))
+
+    target = tmp_path / f"o.{kind}"
+    with pytest.raises(Palette4dError, match="was changed since its shots were analysed"):
+        export(
+            show, tmp_path / "cdls", every=2, format="ccc", jobs=1, progress=cut, **{kind: target}
+        )
+    assert not target.exists()
