@@ -159,7 +159,7 @@ def test_root_installs_nothing_that_a_link_of_another_user_leads_to(
 
 
 @gifts
-@pytest.mark.parametrize("what", ["base", "pth", "module", "settings", "linked"])
+@pytest.mark.parametrize("what", ["base", "pth", "later", "module", "settings", "linked"])
 def test_root_installs_no_environment_of_another_users_python(
     bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
@@ -174,6 +174,8 @@ def test_root_installs_no_environment_of_another_users_python(
         monkeypatch.setattr(sys, "base_prefix", str(theirs))
     elif what == "pth":
         (site / "other.pth").write_text(f"{theirs}\n", "utf-8")
+    elif what == "later":
+        (site / "other.pth").write_text(f"# a comment\n{theirs}/later/lib\n", "utf-8")
     elif what == "module":
         theirs = site / "package" / "theirs"
         theirs.mkdir(parents=True)

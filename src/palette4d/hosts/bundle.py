@@ -150,18 +150,37 @@ def _reason(error: OSError) -> str:
     return error.strerror or str(error)
 
 
+#: Prints Python's folders of modules, also those that files *.pth name and that are not there yet.
+_MODULE_FOLDERS = """
+import glob, os, sys
+print(*sys.path, sep="\\n")
+for file in [file for folder in sys.path for file in glob.glob(glob.escape(folder) + "/*.pth")]:
+    with open(file, encoding="utf-8", errors="surrogateescape") as lines:
+        for line in map(str.strip, lines):
+            if line and not line.startswith(("#", "import ", "import\\t")):
+                print(os.path.join(os.path.dirname(file), line))
+"""
+
+
+def _there(path: Path) -> Path:
+    """Return a path, or the folder where what is missing of it would be made."""
+    while not path.exists():
+        path = path.parent
+    return path
+
+
 def _refuse_others_program(bundle: Path) -> None:
     """Check that root alone may change what all users' nodes will run."""
     # This file: an editable installation runs its sources, which lie elsewhere. The folders of
     # modules: a virtual environment has those of its base, and others by files *.pth.
-    ask = [sys.executable, "-E", "-P", "-c", "import sys; print(*sys.path, sep='\\n')"]
+    ask = [sys.executable, "-E", "-P", "-c", _MODULE_FOLDERS]
     folders = subprocess.run(ask, check=True, stdout=subprocess.PIPE, encoding="utf-8").stdout
     above = (sys.executable, sys.prefix, sys.base_prefix, f"{sys.prefix}/pyvenv.cfg")
     within = (*folders.splitlines(), str(Path(__file__).parents[1]), str(bundle))
     for text in (*above, *within):
         path = Path(text)
         check = changeable_within if text in within else changeable
-        problem = check(path) if path.exists() else None
+        problem = (check if path.exists() else changeable)(_there(path))
         if problem is not None:
             raise Palette4dError(
                 f"{path}: {problem}. Every user's node would run what that one puts there. Install "
