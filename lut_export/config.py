@@ -172,6 +172,14 @@ def write_config(
         shots.append(Shot(shot_names[k], str(sidecars[k]), spaces[k], *ends, baked[k], between[k]))
 
     notes = relocate(config, base, archive, folder)
+    if process_space is not None:
+        given = config.getColorSpace(process_space).getName()
+        known = [shot for shot in shots if shot.process_space != given]
+        notes += [
+            f"look {shot.name}: the config knows its encoding, {shot.process_space}; "
+            f"{Arg('process_space')} is for the others"
+            for shot in known
+        ]
     for shot, sidecar, chosen in zip(shot_names, read, frames, strict=True):
         if not format_.is_cdl and (lacks := without_windows(sidecar, chosen)):
             notes.append(f"look {shot}: {lacks}")

@@ -416,6 +416,13 @@ def test_shots_in_two_encodings(write_sidecar: Callable[..., Path], tmp_path: Pa
     for name, path, space in zip("ab", paths, ("sRGB - Texture", "ACEScct"), strict=True):
         got = shown(done.path, {"FRAME": "10"}, look(name, space))
         np.testing.assert_allclose(got, core(path, 10), atol=1e-5)
+    # One whose encoding nobody knows gets the colour space that is given, the others keep theirs.
+    unknown = write_sidecar(lambda c: c, name="c", encoding="unknown")
+    given = options(10, process_space="Linear Rec.709 (sRGB)")
+    done = write_config([*paths, unknown], tmp_path / "three", **given)
+    spaces = ["sRGB - Texture", "ACEScct", "Linear Rec.709 (sRGB)"]
+    assert [s.process_space for s in done.shots] == spaces
+    assert sum("the config knows its encoding" in note for note in done.notes) == 2
 
 
 class TestRefusals:
