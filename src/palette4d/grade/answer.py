@@ -463,7 +463,11 @@ def _apart(it: _Thing, change: F32) -> Iterator[Note]:
     box = it.view.around(thing_itself)
     after = it.view.within(it.pick, box)
     rest = _lost(change, after, ~thing_itself)
-    if rest > 0.5 and (change - after).mean() > _least(change) and _lost(change, after, it.own) <= COST:
+    if (
+        rest > 0.5
+        and (change - after).mean() > _least(change)
+        and _lost(change, after, it.own) <= COST
+    ):
         words = "if that is not part of it, a window around the thing leaves it out"
         note = Note(words, id=it.pick.id, window=box)
         yield note.proposing("window", after)
