@@ -43,6 +43,7 @@ from palette4d.analysis.report import advice, quality
 from palette4d.analysis.report.quality import Report
 
 from palette4d import _core
+from palette4d.colour.ocio_config import says_linear
 from palette4d.common.errors import Arg, Message, Palette4dError
 from palette4d.common.text import counted
 from palette4d.grade import sidecar
@@ -147,6 +148,7 @@ def analyze(
     options = options or AnalysisOptions()
     clip = clip if isinstance(clip, Clip) else ArrayClip(clip)
     used = colour_space.spaces_of(clip, spaces or SpaceOptions())
+    stated_otherwise = [used.note] if used and used.note else []
     clip = colour_space.converted(clip, used)
     step = even_step(clip.frames)
     if not step:
@@ -197,8 +199,9 @@ def analyze(
         options,
         {stage.stage: stage.losses.max_distance for stage in result.stages},
         brightest=float(finished.vertices[:, :3].max()),
+        linear=clip.encoding if says_linear(clip.encoding) else "",
     )
-    notes = [*clip.notes]
+    notes = [*clip.notes, *stated_otherwise]
     if skipped:
         notes.append(f"{counted(len(skipped), 'bad frame')} skipped: {describe(skipped)}")
     document["colours"] = clip_colours.clip_colours(usable)

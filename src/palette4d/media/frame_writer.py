@@ -37,8 +37,8 @@ _METADATA: dict[str, tuple[str, ...]] = {
 }
 _OWN = {"exr": (), "dpx": ("dpx:",), "tif": ("Exif:", "IPTC:", "GPS:")}
 _COMMON = ("oiio:ColorSpace", "smpte:TimeCode", "smpte:KeyCode")
-#: Characters of a text in a JPEG: all of its Exif data share 64 kB, and libjpeg ends the program where
-#: they are more.
+#: Characters of a text in a JPEG: all of its Exif data share 64 kB, and libjpeg ends the program
+#: where they are more.
 _JPEG_TEXT = 2000
 _HALF_MAX = float(np.finfo(np.float16).max)
 
