@@ -227,6 +227,22 @@ class TestAgain:
         os.utime(sidecar, (later, later))
         assert render(sidecar, clip, out, skip_existing=True, **NONE).frames == [1, 2, 3, 4]
 
+    @pytest.mark.parametrize("output", ["o.#.png", "o.mov"])
+    def test_what_is_of_the_grade_before_an_edit_is_rendered_again(
+        self, tmp_path: Path, output: str
+    ) -> None:
+        sidecar = tmp_path / "s.p4d.json"
+        sidecar.write_bytes(PLAIN.read_bytes())
+        clip = sequence(tmp_path / "in", [1, 2, 3])
+
+        def edit(*_: int) -> None:
+            sidecar.write_bytes(PLAIN.read_bytes())
+
+        render(sidecar, clip, tmp_path / output, progress=edit, **NONE)
+        assert render(sidecar, clip, tmp_path / output, skip_existing=True, **NONE).frames
+        again = render(sidecar, clip, tmp_path / output, skip_existing=True, **NONE)
+        assert again.frames == []
+
     def test_a_movie_stays_if_it_is_whole(
         self, tmp_path: Path, capsys: pytest.CaptureFixture
     ) -> None:

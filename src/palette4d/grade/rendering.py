@@ -280,6 +280,7 @@ def render(
     **picture
         What to draw: ``strength``, ``show`` and so on, as for `Document.recolour`.
     """
+    dated = existing.Dated(document.path if isinstance(document, Document) else document)
     if not isinstance(document, Document):
         document = Document.load(document)
     drawn = Output(**picture)
@@ -327,7 +328,7 @@ def render(
         make_folder(pattern.folder)
         clip, left_out = with_surroundings(clip, pattern, drawn, compare)
         notes = [*repeated, *frame_notes(clip, pattern.extension), *left_out]
-        opened = contextlib.nullcontext(frame_files(clip, pattern, samples))
+        opened = contextlib.nullcontext(frame_files(clip, pattern, samples, dated))
     warnings = mismatches(document, clip, whole)
     notes = [*clip.notes, *notes]
     if tell is not None:
@@ -360,6 +361,8 @@ def render(
         finish()
         if todo and not rendered:
             raise clip.none_readable()
+    if movie:
+        dated(Path(output))
     return Rendered(
         written[:1] if movie else written,
         rendered,
@@ -446,8 +449,13 @@ def frames_to_render(
 _Write = Callable[[Image, F32], Path]
 
 
-def frame_files(clip: Clip, pattern: FramePattern, samples: str) -> _Write:
-    """Return a function that writes a frame to its file, with the source frame's metadata."""
+def frame_files(
+    clip: Clip, pattern: FramePattern, samples: str, dated: Callable[[Path], None]
+) -> _Write:
+    """Return a function that writes a frame to its file, with the source frame's metadata.
+
+    `dated` is called after each file.
+    """
 
     def write(image: Image, pixels: F32) -> Path:
         metadata = image.metadata
@@ -461,9 +469,10 @@ def frame_files(clip: Clip, pattern: FramePattern, samples: str) -> _Write:
             held = image.around.file != clip.file(image.frame)
             own = timecode_in(metadata) if held else None
             write_around(path, image.around, pixels, samples, own)
-            return path
-        premultiplied = clip.premultiplied
-        write_frame(path, pixels, samples, premultiplied=premultiplied, metadata=metadata)
+        else:
+            premultiplied = clip.premultiplied
+            write_frame(path, pixels, samples, premultiplied=premultiplied, metadata=metadata)
+        dated(path)
         return path
 
     return write

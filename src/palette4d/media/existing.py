@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -20,6 +21,31 @@ def is_older(path: Path, sidecar: Path | None) -> bool:
         return False
     about = sidecar.stat()
     return path.stat().st_mtime < max(about.st_mtime, about.st_ctime)
+
+
+class Dated:
+    """Gives files the time of the sidecar that they are of, once that was saved meanwhile.
+
+    So they are older than the sidecar that is there. Make one before the sidecar is read.
+    """
+
+    def __init__(self, sidecar: str | os.PathLike[str] | None) -> None:
+        self._sidecar = sidecar
+        self._before = self._times()
+
+    def __call__(self, path: Path) -> None:
+        """Look after a file that was just written."""
+        if self._before is not None and self._before != self._times():
+            os.utime(path, ns=(self._before[0], self._before[0]))
+
+    def _times(self) -> tuple[int, int] | None:
+        if self._sidecar is None:
+            return None
+        try:
+            about = Path(self._sidecar).stat()
+        except OSError:
+            return 0, 0
+        return about.st_mtime_ns, about.st_ctime_ns
 
 
 def is_whole_frame(path: Path, size: tuple[int, int]) -> bool:
