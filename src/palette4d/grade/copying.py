@@ -83,6 +83,8 @@ class Fit:
             f"the copy differs from the copied grade by {self.mean * 255:.1f} of 255 on average, "
             f"by {self.largest * 255:.1f} at most (99 % of the colours); the grade changes the "
             f"colours by {self.change * 255:.1f}"
+            if self.change
+            else "the grade moves no colours of the palette but by its picks"
         )
         if self.foreign >= 0.005:
             text += (

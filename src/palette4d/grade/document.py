@@ -521,10 +521,13 @@ class Document:
         Raises
         ------
         Palette4dError
-            The source has no edits, the frame is outside of its clip, or its colour space cannot be
-            converted.
+            The source has no edits, the frame is outside of its clip, its colour space cannot be
+            converted, or nothing of it is in this clip.
         """
-        return self._made(copying.copied(self.grade, source.grade, self._clip(clip), time))
+        after, fit = copying.copied(self.grade, source.grade, self._clip(clip), time)
+        if fit.left_out and not after.edited:
+            raise Palette4dError(f"{self.grade.name}: nothing was copied: {fit}; the edits stay")
+        return self._made((after, fit))
 
     # ----------------------------------------------------------------------------------- pictures
 
