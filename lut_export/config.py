@@ -11,8 +11,11 @@ look.
 
 import copy
 import filecmp
+import fnmatch
 import glob
+import os
 import shutil
+import stat
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -154,7 +157,7 @@ def write_config(
             if not path.exists():
                 link.unlink()
             elif link.name in baked_now:
-                _part(link)
+                _part(link, _names_of(name, format_))
         for link, target in links[k].items():
             if (luts / link).exists() and not _is_copy(luts / link, luts / target):
                 refuse_existing(luts / link, force)
@@ -269,22 +272,43 @@ def _refuse_far(names: list[str], between: list[BetweenError | None]) -> None:
         )
 
 
+def _names_of(name: str, format_: LutFormat) -> str:
+    """Return the pattern of a shot's files."""
+    return f"{glob.escape(name)}.*{format_.extension}"
+
+
 def _old_links(luts: Path, name: str, format_: LutFormat) -> list[Path]:
     """Return the links of a shot's looks."""
     if not luts.is_dir():
         return []
-    entries = luts.glob(f"{glob.escape(name)}.*{format_.extension}")
+    entries = luts.glob(_names_of(name, format_))
     return [entry for entry in entries if entry.is_symlink()]
 
 
-def _part(link: Path) -> None:
-    """Make a link a file of its own: the earlier config shows the same until a look replaces it."""
-    if not link.exists():
+def _part(link: Path, names: str) -> None:
+    """Make a link a file of its own: the earlier config shows the same until a look replaces it.
+
+    Links to other files than looks beside it, whose names match `names`, are removed.
+    """
+    leads = link.readlink()
+    try:
+        if leads.parts != (leads.name,) or not fnmatch.fnmatchcase(leads.name, names):
+            raise FileNotFoundError
+        flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+        with os.fdopen(os.open(link.with_name(leads.name), flags), "rb") as look:
+            about = os.fstat(look.fileno())
+            if not stat.S_ISREG(about.st_mode) or about.st_nlink > 1:
+                raise FileNotFoundError
+            data = look.read()
+    except OSError:
         link.unlink()
         return
     with temporary_folder(link.parent) as temporary:
-        shutil.copyfile(link, temporary / link.name)
-        (temporary / link.name).replace(link)
+        copy = temporary / link.name
+        copy.touch(0o600)
+        copy.write_bytes(data)
+        copy.chmod(stat.S_IMODE(about.st_mode))
+        copy.replace(link)
 
 
 def _links(

@@ -256,6 +256,14 @@ def test_the_earlier_config_works_where_a_new_one_fails(shot: Path, tmp_path: Pa
         # Looks that were baked before the end are the new ones already.
         same = [np.array_equal(*pair) for pair in zip(before, after, strict=True)]
         assert sum(same) >= len(frames) - 2
+    # A colleague's link at a look's name leads to no other file.
+    (tmp_path / "private").write_text("mine")
+    (tmp_path / "show/luts/cube/cube.3.clf").unlink(missing_ok=True)
+    (tmp_path / "show/luts/cube/cube.3.clf").symlink_to(tmp_path / "private")
+    with pytest.raises(KeyboardInterrupt):
+        write_config([shot], tmp_path / "show", **options(3, force=True), progress=interrupt)
+    files = (tmp_path / "show/luts/cube").iterdir()
+    assert not any(p.is_file() and p.read_bytes() == b"mine" for p in files)
     write_config([shot], tmp_path / "show", **options(10, force=True))
     names = {p.name: p.is_symlink() for p in (tmp_path / "show/luts/cube").glob("*.clf")}
     assert [names[f"cube.{frame}.clf"] for frame in (0, 1, 9)] == [False, True, True]
