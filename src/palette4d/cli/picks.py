@@ -583,12 +583,12 @@ def _path(pick: Pick) -> list[str]:
     limits = [f"--from {begin:g}"] * (begin > first) + [f"--until {end:g}"] * (end < last)
     given = any(key.given and key.frame == far for key in pick.path)
     if pick.kind == "pick" and limits and not given:
+        same = f"change {pick.id} --toward colour gives it the same new colour. "
+        same = f"If the thing itself changes: {same}" if pick.toward == "shift" else ""
         lines.append(
             f"  note: at frame {far:g} it is {away.max():.2f} away from the picked colour. If that "
             f"is another thing: pick --frame {far:g} --pixel X,Y --with {pick.id}, or change "
-            f"{pick.id} {' '.join(limits)}. If the thing itself changes: change {pick.id} "
-            "--toward colour gives it the same new colour. If it stays: change "
-            f"{pick.id} --no-follow"
+            f"{pick.id} {' '.join(limits)}. {same}If it stays: change {pick.id} --no-follow"
         )
     return lines
 
