@@ -53,6 +53,9 @@ from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip_base import Clip, describe, even_step
 from palette4d.media.colour_space import SpaceOptions
 
+#: The largest frame number of a sidecar (docs/sidecar.md).
+LARGEST_FRAME = 1_000_000_000
+
 T = TypeVar("T")
 Progress = Callable[[str, int, int], object]
 """Called as progress(stage, done, total)."""
@@ -155,6 +158,11 @@ def analyze(
         raise Palette4dError(
             f"the frames {describe(clip.frames)} are not evenly spaced; expected one step between "
             "all frames, such as 1-10 or 1-10x3"
+        )
+    if abs(largest := max(clip.frames, key=abs)) > LARGEST_FRAME:
+        raise Palette4dError(
+            f"{clip.source}: found the frame number {largest}, expected at most {LARGEST_FRAME}; "
+            "give the files smaller numbers"
         )
     earlier = earlier_palette.read(like, clip) if like is not None else None
     tell = progress or (lambda stage, done, total: None)
