@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from palette4d.common.errors import Palette4dError
+from palette4d.common.files import date
 from palette4d.media import oiio_text
 from palette4d.media.clip import open_clip
 from palette4d.media.exr_around import has_every_block
@@ -36,7 +37,7 @@ class Dated:
     def __call__(self, path: Path) -> None:
         """Look after a file that was just written."""
         if self._before is not None and self._before != self._times():
-            os.utime(path, ns=(self._before[0], self._before[0]))
+            date(path, self._before[0])
 
     def _times(self) -> tuple[int, int] | None:
         if self._sidecar is None:
