@@ -140,6 +140,17 @@ class SidecarBytes:
     path: Path
     data: bytes
 
+    @classmethod
+    def of(cls, source: "Path | SidecarBytes") -> "SidecarBytes":
+        """Read a sidecar, unless it was read."""
+        if isinstance(source, SidecarBytes):
+            return source
+        return cls(source, sidecars.read_bytes(source))
+
+    def parsed(self) -> _core.Sidecar:
+        """Return the core's view; `SidecarError` if it is unusable."""
+        return _core.parse_sidecar(self.data, str(self.path))
+
 
 def bake(
     source: str | os.PathLike[str] | Document | SidecarBytes,
@@ -293,7 +304,7 @@ def _opened(
     if not isinstance(source, Document | SidecarBytes):
         source = SidecarBytes(Path(source), sidecars.read_bytes(source))
     if isinstance(source, SidecarBytes):
-        return _core.parse_sidecar(source.data, str(source.path)), source.data, source.path
+        return source.parsed(), source.data, source.path
     fields = source.fields()
     if not source.changed and source.path is not None and source.path.is_file():
         data = sidecars.read_bytes(source.path)

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from palette4d.lut_export import series
+from palette4d.lut_export.bake import SidecarBytes
 from palette4d.lut_export.bake_error import stated
 from palette4d.lut_export.config_base import (
     ANY_SHOT,
@@ -132,7 +133,8 @@ def write_config(
     settings = replace(settings or BakeSettings(), space=PALETTE)
     settings = replace(settings, format=settings.format or "clf")
     format_ = format_named(settings.format or "clf")
-    read = [_core.read_sidecar(str(name)) for name in sidecars]
+    stored = [SidecarBytes.of(file) for file in sidecars]  # all is of this state
+    read = [one.parsed() for one in stored]
     shot_names = _shot_names(sidecars, read, names)
     base = base or BUILT_IN
     config, archive = load_base(base)
@@ -140,7 +142,7 @@ def write_config(
     if not force:
         refuse_looks(config, base, [ANY_SHOT, *shot_names])
     frames = [choose(sidecar) for sidecar in read]
-    between = _between(sidecars, frames, settings.strength, clip)
+    between = _between(stored, frames, settings.strength, clip)
     if not anyway:
         _refuse_far(shot_names, between)
 
@@ -150,14 +152,14 @@ def write_config(
         for name, chosen, sidecar in zip(shot_names, frames, read, strict=True)
     ]
     requests = []
-    for k, (file, name, chosen) in enumerate(zip(sidecars, shot_names, frames, strict=True)):
+    for k, (file, name, chosen) in enumerate(zip(stored, shot_names, frames, strict=True)):
         luts = own_folder(own_folder(folder / LUTS) / name)
         baked_now = {f"{name}.{frame}{format_.extension}" for frame in chosen}
-        for link in _old_links(luts, name, format_):
+        for old in _old_links(luts, name, format_):
             if not path.exists():
-                link.unlink()
-            elif link.name in baked_now:
-                _part(link, _names_of(name, format_))
+                old.unlink()
+            elif old.name in baked_now:
+                _part(old, _names_of(name, format_))
         for link, target in links[k].items():
             if (luts / link).exists() and not _is_copy(luts / link, luts / target):
                 refuse_existing(luts / link, force)
@@ -168,9 +170,9 @@ def write_config(
     for k, sidecar in enumerate(read):
         every = series.every(sidecar, 1)
         _link(requests[k].folder, links[k])
-        for link in _old_links(requests[k].folder, shot_names[k], format_):
-            if link.name not in links[k]:
-                link.unlink()
+        for old in _old_links(requests[k].folder, shot_names[k], format_):
+            if old.name not in links[k]:
+                old.unlink()
         ends = (every[0], every[-1])
         shots.append(Shot(shot_names[k], str(sidecars[k]), spaces[k], *ends, baked[k], between[k]))
 
@@ -244,16 +246,16 @@ def _refuse_failed(names: list[str], baked: list[series.Series]) -> None:
 
 
 def _between(
-    sidecars: list[Path], frames: list[tuple[int, ...]], strength: float, clip: str | None
+    stored: list[SidecarBytes], frames: list[tuple[int, ...]], strength: float, clip: str | None
 ) -> list[BetweenError | None]:
     """Return the errors between the frames of each sidecar; a command's child reads its clip."""
     errors = []
-    for file, baked in zip(sidecars, frames, strict=True):
+    for one, baked in zip(stored, frames, strict=True):
         if sandbox.of_command():
-            with Child(reads=files_of_sidecar(file, clip)) as child:
-                errors.append(child.call(between_error, file, baked, strength, clip))
+            with Child(reads=files_of_sidecar(one.path, clip)) as child:
+                errors.append(child.call(between_error, one, baked, strength, clip))
         else:
-            errors.append(between_error(file, baked, strength, clip))
+            errors.append(between_error(one, baked, strength, clip))
     return errors
 
 

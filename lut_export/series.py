@@ -39,7 +39,6 @@ from palette4d.common.arguments import frames_between
 from palette4d.common.errors import Arg, Palette4dError, WriteError
 from palette4d.common.files import make_folder, replacing, temporary_folder
 from palette4d.common.text import checked_name, file_safe
-from palette4d.grade.sidecar import read_bytes
 from palette4d.jobs.workers import Failed, Workers
 from palette4d.media.clip_files import files_of_sidecar
 
@@ -65,7 +64,7 @@ class Request:
     force : replace files that differ.
     """
 
-    sidecar: Path
+    sidecar: Path | SidecarBytes
     folder: Path
     frames: tuple[int, ...]
     settings: BakeSettings
@@ -279,7 +278,9 @@ def _files(requests: Sequence[Request]) -> list[Path]:
     """Return what the processes that bake must read."""
     files: list[Path] = []
     for request in requests:
-        files += files_of_sidecar(request.sidecar, request.clip)
+        own = request.sidecar
+        file = own.path if isinstance(own, SidecarBytes) else own
+        files += files_of_sidecar(file, request.clip)
         files += files_of_config(request.settings.ocio_config or os.environ.get("OCIO") or "")
     return list(dict.fromkeys(files))
 
@@ -290,8 +291,8 @@ class _Export:
     def __init__(self, request: Request) -> None:
         """Check the request before the first frame is baked."""
         self.request, settings = request, request.settings
-        data = read_bytes(request.sidecar)
-        sidecar = _core.parse_sidecar(data, str(request.sidecar))
+        read = SidecarBytes.of(request.sidecar)
+        self.file, sidecar = read.path, read.parsed()
         assert settings.format is not None
         format_ = format_named(settings.format)
         frames = check_frames(sidecar, request.frames)
@@ -299,7 +300,7 @@ class _Export:
             check_settings(settings, format_, sidecar, frame)
         name = checked_name(request.name) if request.name else file_safe(sidecar.clip["name"])
         self.index = request.folder / f"{name}.series.json"
-        self.header = header_of(sidecar, request.sidecar.name, data, settings)
+        self.header = header_of(sidecar, self.file.name, read.data, settings)
         known = read_index(self.index, self.header, request.force)
         names = {f: file_name(name, f, request.padding, format_.extension) for f in frames}
         self.kept = [f for f in frames if _matches(request.folder / names[f], known.get(f))]
@@ -308,11 +309,11 @@ class _Export:
             target = request.folder / names[frame]
             if target.exists():
                 # A file without an entry may match: a killed export may have left it.
-                check_target(target, request.force or frame not in known, request.sidecar)
+                check_target(target, request.force or frame not in known, self.file)
         # Absolute: other processes may have another working folder. All bake the grade of now.
         clip = None if request.clip is None else str(Path.cwd() / request.clip)
         settings = replace(settings, ocio_config=from_anywhere(settings.ocio_config))
-        read = SidecarBytes(request.sidecar.absolute(), data)
+        read = replace(read, path=self.file.absolute())
         self.tasks = {f: FrameTask(read, f, names[f], settings, clip) for f in todo}
         self.entries = {f: entry for f, entry in known.items() if f not in self.tasks}
         self.baked: list[int] = []
@@ -331,7 +332,8 @@ class _Export:
             return
         entry, data = outcome
         try:
-            _put(self.request.folder / self.tasks[frame].file, data, self.request)
+            target = self.request.folder / self.tasks[frame].file
+            _put(target, data, self.file, self.request.force)
         except WriteError:
             raise  # all other files would fail, too
         except Palette4dError as error:
@@ -364,12 +366,12 @@ def bake_frame(task: FrameTask, threads: int) -> tuple[Entry, bytes]:
         return entry_of(path, result), path.read_bytes()
 
 
-def _put(target: Path, data: bytes, request: Request) -> None:
+def _put(target: Path, data: bytes, sidecar: Path, force: bool) -> None:
     """Write a file atomically; one with the same bytes is kept."""
     if target.is_file() and target.read_bytes() == data:
         return
-    check_target(target, request.force, request.sidecar)
-    with replacing(target, force=request.force) as temporary:
+    check_target(target, force, sidecar)
+    with replacing(target, force=force) as temporary:
         temporary.write_bytes(data)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import PyOpenColorIO as ocio
 import pytest
 from numpy.typing import NDArray
-from palette4d.lut_export import series
+from palette4d.lut_export import config, series
 from palette4d.lut_export.config import WrittenConfig, write_config
 from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.measured_write import BakeSettings
@@ -133,6 +133,27 @@ def test_frames_between_state_their_error(
     finer = write_config([shot], tmp_path / "finer", **options(2, anyway=False)).shots[0].between
     assert finer is not None
     assert finer.delta_e < 0.9 * between.delta_e
+
+
+def test_a_config_is_of_the_grade_of_its_start(
+    shot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Studio may save an edit while the frames between are looked at."""
+    done = write_config([shot], tmp_path / "whole", **options(4))
+    document, between = json.loads(shot.read_text("utf-8")), config.between_error
+
+    def slow(*arguments: Any) -> Any:
+        document["edits"] = {"vertices": [], "stops": []}
+        shot.write_text(json.dumps(document), "utf-8")
+        return between(*arguments)
+
+    monkeypatch.setattr(config, "between_error", slow)
+    edited = write_config([shot], tmp_path / "edited", **options(4))
+    (one,), (other,) = done.shots, edited.shots
+    assert one.between == other.between
+    for frame in (0, 5, 10):
+        seen = [shown(each.path, {"FRAME": str(frame)}, look("cube")) for each in (done, edited)]
+        np.testing.assert_array_equal(*seen)
 
 
 def test_a_stop_between_two_looks_is_found(

@@ -104,19 +104,18 @@ def analyse(
     tell(*show.progress())
     try:
         # A shot may take minutes: Ctrl-C does not wait for it.
-        reads = _files(show.tasks.values())
+        reads = _files(show.tasks.values(), options.spaces.ocio_config)
         options.workers.run(analyse_shot, show.tasks, take, patient=False, reads=reads)
     finally:
         show.save()
     return show
 
 
-def _files(tasks: Iterable[ShotTask]) -> list[Path]:
+def _files(tasks: Iterable[ShotTask], config: str | None) -> list[Path]:
     """Return what the processes that analyse shots must read."""
-    clips = {task.clip: task.options.spaces.ocio_config for task in tasks}
+    clips = dict.fromkeys(task.clip for task in tasks)
     files = [path for clip in clips for path in files_of(clip)]
-    configs = {config or os.environ.get("OCIO") or "" for config in clips.values()}
-    return files + [path for config in sorted(configs) for path in files_of_config(config)]
+    return files + files_of_config(config or os.environ.get("OCIO") or "")
 
 
 class Show:
@@ -214,8 +213,7 @@ class Show:
 
     def task(self, shot: Shot, entry: Entry) -> ShotTask:
         """Return what is to be done for a shot."""
-        own = entry.spaces or _given(self._head.options)
-        config = self.options.spaces.ocio_config or _text(self._head.options, "ocio_config")
+        own, config = entry.spaces or _given(self._head.options), self.options.spaces.ocio_config
         options = dataclasses.replace(self.options, spaces=SpaceOptions(**own, ocio_config=config))
         return ShotTask(shot, str(Path.cwd() / shot.clip), options)
 
