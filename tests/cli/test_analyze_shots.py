@@ -15,6 +15,7 @@ from typing import Any
 
 import jsonschema
 import opentimelineio as otio
+import PyOpenColorIO as ocio
 import pytest
 from any_clips import harbour
 from clip_files import write_image
@@ -459,6 +460,20 @@ class TestColourSpaces:
             own = manifest(out)["shots"][1].get("input_space")
             space = sidecar(out, "rushes_s002")["clip"].get("conversion", {}).get("input_space")
             assert space == (own or manifest(out)["options"].get("input_space"))
+
+    def test_a_shot_of_another_config(self, cut_movie: Path, tmp_path: Path) -> None:
+        out, own = tmp_path / "shots", tmp_path / "own.ocio"
+        config = ocio.Config.CreateFromBuiltinConfig("ocio://studio-config-latest")
+        config.addColorSpace(ocio.ColorSpace(name="mine", encoding="sdr-video"))
+        own.write_text(config.serialize(), "utf-8")
+        spaces = ("--input-space", "mine", "--palette-space", "ACEScct", "--ocio-config", str(own))
+        assert analyze(cut_movie, out, "--detect-shots") == 0
+        assert analyze(cut_movie, out, "--detect-shots", "--only", "rushes_s002", *spaces) == 0
+        before = sidecar(out, "rushes_s002")
+        assert before["clip"]["conversion"]["config"] == str(own)
+        assert analyze(cut_movie, out, "--detect-shots", "--force") == 0
+        assert sidecar(out, "rushes_s002") == before
+        assert "conversion" not in sidecar(out, "rushes_s001")["clip"]
 
     def test_an_unknown_space_fails_each_shot(
         self, cut_movie: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -20,7 +20,7 @@ from palette4d.analysis import pipeline
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.colour.ocio_config import files_of_config
 from palette4d.common.errors import Arg, Palette4dError, in_words
-from palette4d.common.files import make_folder
+from palette4d.common.files import make_folder, names_a_server
 from palette4d.common.text import counted, some_of
 from palette4d.grade import reanalysis, sidecar
 from palette4d.jobs.workers import Failed, Workers
@@ -104,18 +104,19 @@ def analyse(
     tell(*show.progress())
     try:
         # A shot may take minutes: Ctrl-C does not wait for it.
-        reads = _files(show.tasks.values(), options.spaces.ocio_config)
+        reads = _files(show.tasks.values())
         options.workers.run(analyse_shot, show.tasks, take, patient=False, reads=reads)
     finally:
         show.save()
     return show
 
 
-def _files(tasks: Iterable[ShotTask], config: str | None) -> list[Path]:
+def _files(tasks: Iterable[ShotTask]) -> list[Path]:
     """Return what the processes that analyse shots must read."""
-    clips = dict.fromkeys(task.clip for task in tasks)
-    files = [path for clip in clips for path in files_of(clip)]
-    return files + files_of_config(config or os.environ.get("OCIO") or "")
+    configs = {task.clip: task.options.spaces.ocio_config for task in tasks}
+    files = [path for clip in configs for path in files_of(clip)]
+    named = dict.fromkeys(config or os.environ.get("OCIO") or "" for config in configs.values())
+    return files + [path for config in named for path in files_of_config(config)]
 
 
 class Show:
@@ -140,7 +141,8 @@ class Show:
         recorded = options.analysis.recorded() | spaces
         self.own: dict[str, str] = {}  # of the chosen shots
         if before is not None and options.only:
-            self.own, recorded = _given(spaces), before.options
+            # What is not given is the show's.
+            self.own, recorded = {**_given(before.options), **_given(spaces)}, before.options
         self._head = Manifest(
             source=self.beside(source.file),
             source_sha256=source.sha256,
@@ -213,8 +215,14 @@ class Show:
 
     def task(self, shot: Shot, entry: Entry) -> ShotTask:
         """Return what is to be done for a shot."""
-        own, config = entry.spaces or _given(self._head.options), self.options.spaces.ocio_config
-        options = dataclasses.replace(self.options, spaces=SpaceOptions(**own, ocio_config=config))
+        own = entry.spaces or _given(self._head.options)
+        config = own.get("ocio_config", "")
+        if config != self.options.spaces.ocio_config and names_a_server(config, self.path):
+            raise Palette4dError(
+                f"{self.path}: found the config {config}, on another server, expected one that you "
+                f"name yourself, with {Arg('ocio_config')}"
+            )
+        options = dataclasses.replace(self.options, spaces=SpaceOptions(**own))
         return ShotTask(shot, str(Path.cwd() / shot.clip), options)
 
     def stays(self, before: Entry, shot: Shot) -> bool:
@@ -265,10 +273,8 @@ class Show:
 
     def same_spaces(self, before: Entry) -> bool:
         """Whether a shot has the colour spaces of the analysis before."""
-        now, then = self._head.options, self.before
-        wanted = self.spaces_for(before) or _given(now)
-        same_config = _text(now, "ocio_config") == _text(then, "ocio_config")
-        return wanted == (before.spaces or _given(then)) and same_config
+        wanted = self.spaces_for(before) or _given(self._head.options)
+        return wanted == (before.spaces or _given(self.before))
 
     def beside(self, clip: str) -> str:
         """Return a path relative to the folder, so that both may move together."""
@@ -311,14 +317,10 @@ class Show:
         return total - left, total, f"{ready} of {counted(len(self.entries), 'shot')}"
 
 
-def _text(options: Mapping[str, Any], name: str) -> str | None:
-    value = options.get(name)
-    return value if isinstance(value, str) and value else None
-
-
 def _given(options: Mapping[str, Any]) -> dict[str, str]:
-    """Return the colour spaces that are given."""
-    return {name: text for name in manifests.SPACES if (text := _text(options, name)) is not None}
+    """Return the colour spaces that are given, and their config."""
+    named = {name: options.get(name) for name in manifests.SPACES}
+    return {name: value for name, value in named.items() if isinstance(value, str) and value}
 
 
 def _played(shot: Shot, frames: tuple[int, int]) -> dict[str, Any]:

@@ -33,7 +33,7 @@ _LONGEST_NAME = 200
 
 DONE, FAILED, TO_DO = "done", "failed", "to do"
 #: The options that a shot may have of its own.
-SPACES = ("input_space", "palette_space")
+SPACES = ("input_space", "palette_space", "ocio_config")
 
 
 @dataclasses.dataclass(frozen=True)
