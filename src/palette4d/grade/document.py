@@ -501,7 +501,7 @@ class Document:
 
         Each handle gets the colour that the other grade makes of its colour at the corresponding
         time. Picks are learned again there. Active edits that no version holds are kept as the
-        version "before copy".
+        version "before copy". If nothing of the grade is in this clip, the edits stay.
 
         Parameters
         ----------
@@ -521,13 +521,11 @@ class Document:
         Raises
         ------
         Palette4dError
-            The source has no edits, the frame is outside of its clip, its colour space cannot be
-            converted, or nothing of it is in this clip.
+            The source has no edits, the frame is outside of its clip, or its colour space cannot be
+            converted.
         """
         after, fit = copying.copied(self.grade, source.grade, self._clip(clip), time)
-        if fit.left_out and not after.edited:
-            raise Palette4dError(f"{self.grade.name}: nothing was copied: {fit}; the edits stay")
-        return self._made((after, fit))
+        return fit if fit.nothing else self._made((after, fit))
 
     # ----------------------------------------------------------------------------------- pictures
 
