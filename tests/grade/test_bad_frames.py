@@ -212,7 +212,11 @@ class TestAgain:
         (tmp_path / f"o.2.{extension}").write_bytes(whole[: len(whole) // 2])
         write_image(tmp_path / "small.png", grey(1)[:8])
         render(sidecar, str(tmp_path / "small.png"), tmp_path / f"o.3.{extension}", force=True)
-        done = render(sidecar, clip, out, skip_existing=True, **NONE)
+        told: list[tuple[int, int]] = []
+        done = render(
+            sidecar, clip, out, skip_existing=True, progress=lambda *n: told.append(n), **NONE
+        )
+        assert told == [(1, 3), (2, 3), (3, 3)]
         assert (done.frames, done.kept) == ([1, 2, 3], [4])
         assert any("3 damaged" in note for note in done.notes)
         assert (tmp_path / f"o.1.{extension}").stat().st_size == len(whole)  # EXR has its time

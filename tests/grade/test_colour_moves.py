@@ -113,6 +113,10 @@ def test_a_track_gets_a_colour() -> None:
         shift = np.subtract(doc.grade.colour(id_), before)
         share = min(1, luma(before) / luma(old["v8"]))
         assert shift == pytest.approx(share * np.subtract(new, old["v8"]), abs=1e-12)
+    black = document("split")
+    black.set("v8", rgb="#000000")
+    black.adjust("v8", track=True, rgb=new)  # all others are lighter
+    assert black.grade.colour("v12") == pytest.approx(np.add(old["v12"], new))
     edge = document("split")
     edge.adjust("e4", track=True, frame=4.5, rgb=(0.5, 0.5, 0.5))
     assert edge.grade.colour("e4", frame=4.5) == pytest.approx((0.5, 0.5, 0.5))
@@ -258,12 +262,16 @@ def test_earlier_edits_stay_outside_of_a_range(data: st.DataObject) -> None:
 
 
 def test_a_range_fades_linearly_or_smoothly() -> None:
-    for ramp, expected in (
-        (None, [0, 0.25, 0.5, 0.75, 1]),
-        ("smooth", [0, 5 / 32, 0.5, 27 / 32, 1]),
+    linear, smooth = [0, 0.25, 0.5, 0.75, 1], [0, 5 / 32, 0.5, 27 / 32, 1]
+    for clip_ramp, ramp, expected in (
+        ("linear", None, linear),
+        ("linear", "smooth", smooth),
+        ("smooth", None, smooth),
+        ("hold", None, linear),  # a step would be no fade
     ):
         for (start, until), times in (((5, 7), (1, 2, 3, 4, 5)), ((2, 4), (8, 7, 6, 5, 4))):
             one, two = document("split"), document("split")
+            two.set_ramp(clip_ramp)
             offset = {"by": [0.5, 0, 0], "start": start, "until": until, "fade": 4, "ramp": ramp}
             two.adjust("e1", track=True, **offset)
             found = [

@@ -107,11 +107,12 @@ def test_two_new_stops_of_one_id_are_two_stops() -> None:
 
 
 def test_two_new_picks_of_one_id_are_two_picks() -> None:
-    mine: State = {("pick", "p1"): Pick("p1", "hold", 1, (0, 0, 0))}
+    mine: State = {("pick", id_): Pick(id_, "hold", 1, (0, 0, 0)) for id_ in ("p1", "p2")}
     theirs: State = {("pick", "p1"): Pick("p1", "hold", 2, (0, 0, 0))}
     assert merged({}, mine, theirs, ()) == {
         ("pick", "p1"): Pick("p1", "hold", 2, (0, 0, 0)),
         ("pick", "p2"): Pick("p2", "hold", 1, (0, 0, 0)),
+        ("pick", "p3"): Pick("p3", "hold", 1, (0, 0, 0)),
     }
 
 

@@ -75,6 +75,14 @@ def test_a_fork_ends_before_the_vertex_of_another_track() -> None:
     assert called == ["light grey, 10-20", "grey, 0-9"]
 
 
+def test_a_fork_between_tracks_is_called_by_what_it_comes_from_and_becomes() -> None:
+    fields = palette_of([(0, 0.9, 0, 0), (9, 0.9, 0, 0)], [(0, 0, 0.8, 0), (9, 0, 0.8, 0)])
+    fields["edges"].append({"id": "e3", "from": "v1", "to": "v4"})
+    handles = Handles(fields)
+    tracks = tracks_of(handles, {"v1": "red", "v2": "red", "v3": "green", "v4": "green"})
+    assert [track.called for track in tracks] == ["red, 0-9", "green, 0-9", "red > green, 0-9"]
+
+
 def test_names_are_of_the_unedited_colours_and_at_whole_frames() -> None:
     document = Document.load(SPLIT)
     names, tracks = document.grade.names, [track.called for track in document.grade.tracks]

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,11 +35,13 @@ def test_a_path_is_alike_until_it_leaves_the_picked_colour() -> None:
     assert Pick("p1", "hold", 10, GREY, path=gone).alike() == (10, 21)
 
 
-def test_a_darker_colour_changes_less() -> None:
-    path = (PathKey(0, (0.8, 0.2, 0.2)), PathKey(10, (0.4, 0.1, 0.1)))
-    pick = Pick("p1", "pick", 0, (0.8, 0.2, 0.2), (0.8, 0.6, 0.2), path=path)
-    assert pick.change_at(0) == pytest.approx([0, 0.4, 0])
-    assert pick.change_at(10) == pytest.approx([0, 0.2, 0])
+def test_a_darker_colour_changes_less_and_a_lighter_one_no_more() -> None:
+    rgb = ((0.8, 0.2, 0.2), (0.4, 0.1, 0.1), (1.0, 0.25, 0.25))
+    path = tuple(PathKey(10 * i, colour) for i, colour in enumerate(rgb))
+    pick = Pick("p1", "pick", 0, (0.8, 0.2, 0.2), (0.7, 0.6, 0.3), path=path)
+    assert pick.change_at(0) == pytest.approx([-0.1, 0.4, 0.1])
+    assert pick.change_at(10) == pytest.approx([-0.05, 0.2, 0.05])
+    assert pick.change_at(20) == pytest.approx([-0.1, 0.4, 0.1])
 
 
 @pytest.mark.parametrize(("path", "frames"), [
@@ -296,6 +299,34 @@ def test_a_window_is_undone_kept_in_versions_saved_and_merged(
     assert document.pick(0, **same, window=BOX).id == "p3"
 
 
+def test_a_version_keeps_what_its_picks_have_learned(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    document = moving(monkeypatch)
+    pick = document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
+    document.save_version("blue")
+    document.reset()
+    document.forget_history()
+    document.save(tmp_path / "a.p4d.json")
+    again = Document.load(tmp_path / "a.p4d.json", version="blue").grade
+    assert again.pick("p1") == pick
+    assert pick.matte in again.mattes
+
+
+def test_what_follows_tells_its_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    document, told = moving(monkeypatch), list[tuple[int, int]]()
+    how: dict[str, Any] = {"progress": lambda done, total: told.append((done, total))}
+    for edit in (
+        lambda: document.pick(0, pixel=(20, 30), box=9, to="#2040b0", **how),
+        lambda: document.hold(0, pixel=(60, 8), box=9, **how),
+        lambda: document.correct_path("p1", 5, pixel=(50, 30), box=9, **how),
+        lambda: document.set_window("p1", 0, BOX, **how),
+    ):
+        told.clear()
+        edit()
+        assert told == [(done, 6) for done in range(1, 7)]
+
+
 def test_a_window_is_followed_when_the_clip_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
     document = moving(monkeypatch)
     document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
@@ -357,6 +388,7 @@ def test_python_and_the_core_allow_as_many_enabled_picks(tmp_path: Path) -> None
     picks = [replace(p, enabled=i < MOST_PICKS).to_fields() for i, p in enumerate(made)]
     fields |= {"version": 2, "edits": {**fields["edits"], "picks": picks}}
     full = Document(fields)
+    assert [pick.id for pick in full.grade.picks] == [pick.id for pick in made]  # q2 before q10
     with pytest.raises(Palette4dError, match=f"at most {MOST_PICKS} can be enabled"):
         full.pick(8, colour=GREY, by=(0.2, 0, 0), follow=False)
     with pytest.raises(Palette4dError, match=f"at most {MOST_PICKS} can be enabled"):

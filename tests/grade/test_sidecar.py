@@ -252,16 +252,18 @@ def test_edits_are_dropped_on_request(edited: Path) -> None:
     assert sidecar.load(edited) == golden("split")
 
 
-def test_edits_are_kept_with_the_same_palette(edited: Path) -> None:
-    old = sidecar.load(edited)
-    document = golden("split")
-    document["quality"]["options"]["seed"] = 1
-    sidecar.check_target(edited, on_edits="keep")
-    sidecar.save(document, edited, on_edits="keep")
-    new = sidecar.load(edited)
-    assert new["edits"] == old["edits"]
-    assert new["extra"] == old["extra"]
-    assert new["quality"]["options"]["seed"] == 1
+@pytest.mark.parametrize("name", ["v1_edited", "v2_picks"])
+def test_edits_are_kept_with_the_same_palette(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "clip.p4d.json"
+    path.write_bytes((GOLDEN / f"{name}.p4d.json").read_bytes())
+    old = sidecar.load(path)
+    document = sidecar.new_document(old["clip"], old["polytope"], {"options": {"seed": 1}})
+    sidecar.check_target(path, on_edits="keep")
+    sidecar.save(document, path, on_edits="keep")
+    new = sidecar.load(path)
+    for member in ("version", "edits", "versions", "history", "mattes", "extra"):
+        assert new.get(member) == old.get(member)
+    assert new["quality"]["options"] == {"seed": 1}
 
 
 def test_edits_are_not_kept_with_another_palette(edited: Path) -> None:
