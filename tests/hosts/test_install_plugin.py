@@ -284,6 +284,17 @@ def test_a_file_in_the_folders_place_is_named(bundle: Path, tmp_path: Path) -> N
         install_bundle(bundle, tmp_path / "OFX")
 
 
+def test_a_drive_that_is_not_there_is_named(
+    bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On Windows; elsewhere the root is always there."""
+    gone = Path("D:/gone/OFX" if os.name == "nt" else "/gone/OFX")
+    exists = Path.exists
+    monkeypatch.setattr(Path, "exists", lambda path: path != Path(gone.anchor) and exists(path))
+    with pytest.raises(Palette4dError, match="there is no such drive"):
+        install_bundle(bundle, gone)
+
+
 def test_a_failed_rename_puts_the_old_bundle_back(
     bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -192,6 +192,8 @@ def _refuse_others_program(bundle: Path) -> None:
 def _make_open_folder(folder: Path) -> None:
     """Make a folder and its parents; root's are readable for all whatever the umask is."""
     if not folder.exists():
+        if folder.parent == folder:
+            raise FileNotFoundError(errno.ENOENT, "there is no such drive", str(folder))
         _make_open_folder(folder.parent)
         folder.mkdir(exist_ok=True)
         if runs_as_root():
