@@ -296,8 +296,8 @@ def _part(link: Path, names: str) -> None:
     try:
         if leads.parts != (leads.name,) or not fnmatch.fnmatchcase(leads.name, names):
             raise FileNotFoundError
-        flags = os.O_RDONLY | getattr(os, "O_BINARY", 0)  # Windows has neither of these two
-        flags |= getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+        names_of_flags = ("O_BINARY", "O_NOFOLLOW", "O_NONBLOCK")  # as far as the system has them
+        flags = os.O_RDONLY | sum(getattr(os, flag, 0) for flag in names_of_flags)
         with os.fdopen(os.open(link.with_name(leads.name), flags), "rb") as look:
             about = os.fstat(look.fileno())
             if not stat.S_ISREG(about.st_mode) or about.st_nlink > 1:

@@ -200,10 +200,10 @@ class Show:
             _tell_edit(self.folder / entry.sidecar, own, frames)
         elif chosen:
             try:
-                self.check_target(entry, before)
                 self.tasks[shot.name] = self.task(shot, entry)
+                self.check_target(entry, before)
             except Palette4dError as error:
-                if before is not None and before.status == DONE:
+                if self.tasks.pop(shot.name, None) and before is not None and before.status == DONE:
                     self.graded.append(shot.name)
                 entry = dataclasses.replace(entry, status=FAILED, error=error.message.marked)
         self.entries[shot.name] = entry
