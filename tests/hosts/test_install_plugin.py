@@ -375,7 +375,7 @@ def test_says_which_systems_a_bundle_is_for(
 
 
 def test_the_verb_installs_the_packaged_node(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     parser = argparse.ArgumentParser()
     install_plugin.add_parser(parser.add_subparsers())
@@ -387,6 +387,10 @@ def test_the_verb_installs_the_packaged_node(
     assert files(tmp_path / "OFX" / BUNDLE) == files(packaged)
     binary = tmp_path / "OFX" / BUNDLE / "Contents" / architecture() / "Palette4D.ofx"
     assert binary.stat().st_size > 100_000
+    # In the standard's folder hosts look by themselves.
+    monkeypatch.setattr(install_plugin, "system_destination", lambda: tmp_path / "OFX")
+    assert args.run(args) == 0
+    assert "OFX_PLUGIN_PATH" not in capsys.readouterr().out
 
 
 def test_without_a_folder_the_verb_says_first_where_it_installs(
