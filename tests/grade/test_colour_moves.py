@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from palette4d.colour.encoding_conversion import between
 from palette4d.colour.oklch import Adjustment, adjuster
 from palette4d.common.errors import Palette4dError
 from palette4d.grade import sidecar
@@ -66,6 +67,11 @@ def test_opposite_changes_cancel_out(encoding: str) -> None:
 
 def test_the_encoding_counts() -> None:
     """Twice the lightness and chroma is eight times the light."""
+    graded, light = document("scene_linear"), between("ACEScct", "ACEScg")
+    assert light is not None
+    before = light(graded.grade.colour("v9"))
+    graded.adjust("v9", chroma=2, lightness=2)
+    assert light(graded.grade.colour("v9")) == pytest.approx(8 * before, rel=1e-3)
     double = Adjustment(chroma=2, lightness=2)
     linear = adjuster("lin_rec709", double)((0.01, 0.02, 0.03))
     assert linear == pytest.approx([0.08, 0.16, 0.24], rel=1e-4)

@@ -157,7 +157,9 @@ def test_new_ids_are_never_those_of_old_stops() -> None:
     assert new_id("s", ("s1", "s3", "v9", "s", "sx", "s007", "s٣")) == "s8"
 
 
-@pytest.mark.parametrize("wrong", [(1, 2), (1, 2, float("nan")), (1, 2, 2e6), "red", 3, None])
+@pytest.mark.parametrize(
+    "wrong", [(1, 2), (1, 2, float("nan")), (1, 2, 2e6), "red", "#ff003380", 3, None]
+)
 def test_colours_are_three_finite_numbers(wrong: object) -> None:
     with pytest.raises(Palette4dError):
         as_colour(wrong)  # type: ignore[arg-type]

@@ -95,7 +95,7 @@ def test_names_are_of_the_unedited_colours_and_at_whole_frames() -> None:
 
 def test_a_stop_has_the_name_of_the_nearer_end() -> None:
     document = Document.load(SPLIT)
-    edge = document.fields()["polytope"]["edges"][0]
+    edge = document.grade.handles.edges["e9"]  # from grey to light grey
     start, end = (document.grade.frame_of(edge[end]) for end in ("from", "to"))
     for share, near in ((0.25, edge["from"]), (0.75, edge["to"])):
         stop = document.stop(edge["id"], frame=start + share * (end - start), rgb=(0, 1, 0))

@@ -119,6 +119,10 @@ def test_another_pixel_without_a_box_is_that_pixel(monkeypatch: pytest.MonkeyPat
     document.change_pick("p1", pixel=(20, 10))
     pick = document.grade.pick("p1")
     assert (pick.box, pick.rgb) == (1, pytest.approx((0.8, 0.3, 0.2), abs=0.04))
+    # Another palette takes the pick over with its box.
+    pick = document.change_pick("p1", pixel=(20, 10), box=5)
+    taken, _ = pick_edits.taken(document.grade, ClipOfPicks.of(document.grade), [pick])
+    assert taken.pick("p1").rgb == pick.rgb == pytest.approx((0.4, 0.4, 0.4), abs=0.04)
 
 
 def moving(monkeypatch: pytest.MonkeyPatch, frames: int = 6) -> Document:
@@ -187,9 +191,10 @@ def test_a_window_across_the_picture_stays(monkeypatch: pytest.MonkeyPatch) -> N
         assert pick.window is not None
         assert pick.window.keys == (WindowKey(0, box, True),)
     # Beyond one side there is a thing that leaves the picture.
-    pick = document.set_window("p1", 0, (-1, 16, 34, 44))
-    assert pick.window is not None
-    assert not pick.window.keys[-1].given
+    for box in ((-1, 16, 34, 44), (0, 16, 120, 44)):
+        pick = document.set_window("p1", 0, box)
+        assert pick.window is not None
+        assert not pick.window.keys[-1].given
 
 
 def test_a_new_range_is_followed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -296,6 +301,9 @@ def test_a_window_is_undone_kept_in_versions_saved_and_merged(
     same = {"pixel": (20, 30), "box": 9, "to": "#2040b0"}
     with pytest.raises(Palette4dError, match="p1 is this pick already"):
         document.pick(0, **same, window=(0, 0, 60, 60), feather=9)
+    unread = later.Unread(document.grade.pick("p1").rgb)  # as Studio makes it at once
+    with pytest.raises(Palette4dError, match="p1 is this pick already"):
+        document.pick(0, **same, window=(0, 0, 60, 60), feather=9, clip=unread)
     assert document.pick(0, **same, window=BOX).id == "p3"
 
 
