@@ -43,6 +43,7 @@ from palette4d.analysis.report import advice, quality
 from palette4d.analysis.report.quality import Report
 
 from palette4d import _core
+from palette4d.colour.ocio_config import says_linear
 from palette4d.common.errors import Arg, Message, Palette4dError
 from palette4d.common.text import counted
 from palette4d.grade import sidecar
@@ -51,6 +52,9 @@ from palette4d.media import colour_space, cuts
 from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip_base import Clip, describe, even_step
 from palette4d.media.colour_space import SpaceOptions
+
+#: The largest frame number of a sidecar (docs/sidecar.md).
+LARGEST_FRAME = 1_000_000_000
 
 T = TypeVar("T")
 Progress = Callable[[str, int, int], object]
@@ -147,12 +151,18 @@ def analyze(
     options = options or AnalysisOptions()
     clip = clip if isinstance(clip, Clip) else ArrayClip(clip)
     used = colour_space.spaces_of(clip, spaces or SpaceOptions())
+    stated_otherwise = [used.note] if used and used.note else []
     clip = colour_space.converted(clip, used)
     step = even_step(clip.frames)
     if not step:
         raise Palette4dError(
             f"the frames {describe(clip.frames)} are not evenly spaced; expected one step between "
             "all frames, such as 1-10 or 1-10x3"
+        )
+    if abs(largest := max(clip.frames, key=abs)) > LARGEST_FRAME:
+        raise Palette4dError(
+            f"{clip.source}: found the frame number {largest}, expected at most {LARGEST_FRAME}; "
+            "give the files smaller numbers"
         )
     earlier = earlier_palette.read(like, clip) if like is not None else None
     tell = progress or (lambda stage, done, total: None)
@@ -197,8 +207,9 @@ def analyze(
         options,
         {stage.stage: stage.losses.max_distance for stage in result.stages},
         brightest=float(finished.vertices[:, :3].max()),
+        linear=clip.encoding if says_linear(clip.encoding) else "",
     )
-    notes = [*clip.notes]
+    notes = [*clip.notes, *stated_otherwise]
     if skipped:
         notes.append(f"{counted(len(skipped), 'bad frame')} skipped: {describe(skipped)}")
     document["colours"] = clip_colours.clip_colours(usable)

@@ -133,8 +133,27 @@ class BakeResult:
         return self.clip is not None and self.clip.visible > SEEN
 
 
+@dataclass(frozen=True)
+class SidecarBytes:
+    """A sidecar that was read already: its file may change meanwhile."""
+
+    path: Path
+    data: bytes
+
+    @classmethod
+    def of(cls, source: "Path | SidecarBytes") -> "SidecarBytes":
+        """Read a sidecar, unless it was read."""
+        if isinstance(source, SidecarBytes):
+            return source
+        return cls(source, sidecars.read_bytes(source))
+
+    def parsed(self) -> _core.Sidecar:
+        """Return the core's view; `SidecarError` if it is unusable."""
+        return _core.parse_sidecar(self.data, str(self.path))
+
+
 def bake(
-    source: str | os.PathLike[str] | Document,
+    source: str | os.PathLike[str] | Document | SidecarBytes,
     frame: float,
     path: str | os.PathLike[str],
     *,
@@ -154,7 +173,7 @@ def bake(
 
     Parameters
     ----------
-    source : path or Document
+    source : path, Document or SidecarBytes
         A sidecar (.p4d.json), or a document.
     frame : float
         The time, a frame number of the clip; fractions are allowed.
@@ -279,12 +298,13 @@ def _beside_clean_up(job: Job, readers: Mapping[str, Reader]) -> DeltaE | None:
 
 
 def _opened(
-    source: str | os.PathLike[str] | Document,
+    source: str | os.PathLike[str] | Document | SidecarBytes,
 ) -> tuple[_core.Sidecar, bytes, Path | None]:
     """Return the core's view of a sidecar, its bytes, and its file."""
-    if not isinstance(source, Document):
-        data = sidecars.read_bytes(source)
-        return _core.parse_sidecar(data, os.fspath(source)), data, Path(source)
+    if not isinstance(source, Document | SidecarBytes):
+        source = SidecarBytes(Path(source), sidecars.read_bytes(source))
+    if isinstance(source, SidecarBytes):
+        return source.parsed(), source.data, source.path
     fields = source.fields()
     if not source.changed and source.path is not None and source.path.is_file():
         data = sidecars.read_bytes(source.path)

@@ -11,14 +11,18 @@ look.
 
 import copy
 import filecmp
+import fnmatch
 import glob
+import os
 import shutil
+import stat
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from palette4d.lut_export import series
+from palette4d.lut_export.bake import SidecarBytes
 from palette4d.lut_export.bake_error import stated
 from palette4d.lut_export.config_base import (
     ANY_SHOT,
@@ -40,7 +44,13 @@ from palette4d.colour.ocio_config import BUILT_IN, config_of, failures
 from palette4d.common import sandbox
 from palette4d.common.child import Child
 from palette4d.common.errors import Arg, Palette4dError
-from palette4d.common.files import make_folder, refuse_existing, replace_by_link, replacing
+from palette4d.common.files import (
+    make_folder,
+    refuse_existing,
+    replace_by_link,
+    replacing,
+    temporary_folder,
+)
 from palette4d.common.text import checked_name, counted, file_safe
 from palette4d.jobs.workers import Workers
 from palette4d.media.clip_files import files_of_sidecar
@@ -123,7 +133,8 @@ def write_config(
     settings = replace(settings or BakeSettings(), space=PALETTE)
     settings = replace(settings, format=settings.format or "clf")
     format_ = format_named(settings.format or "clf")
-    read = [_core.read_sidecar(str(name)) for name in sidecars]
+    stored = [SidecarBytes.of(file) for file in sidecars]  # all is of this state
+    read = [one.parsed() for one in stored]
     shot_names = _shot_names(sidecars, read, names)
     base = base or BUILT_IN
     config, archive = load_base(base)
@@ -131,7 +142,7 @@ def write_config(
     if not force:
         refuse_looks(config, base, [ANY_SHOT, *shot_names])
     frames = [choose(sidecar) for sidecar in read]
-    between = _between(sidecars, frames, settings.strength, clip)
+    between = _between(stored, frames, settings.strength, clip)
     if not anyway:
         _refuse_far(shot_names, between)
 
@@ -141,9 +152,14 @@ def write_config(
         for name, chosen, sidecar in zip(shot_names, frames, read, strict=True)
     ]
     requests = []
-    for k, (file, name, chosen) in enumerate(zip(sidecars, shot_names, frames, strict=True)):
+    for k, (file, name, chosen) in enumerate(zip(stored, shot_names, frames, strict=True)):
         luts = own_folder(own_folder(folder / LUTS) / name)
-        _remove_links(luts, name, format_)
+        baked_now = {f"{name}.{frame}{format_.extension}" for frame in chosen}
+        for old in _old_links(luts, name, format_):
+            if not path.exists():
+                old.unlink()
+            elif old.name in baked_now:
+                _part(old, _names_of(name, format_))
         for link, target in links[k].items():
             if (luts / link).exists() and not _is_copy(luts / link, luts / target):
                 refuse_existing(luts / link, force)
@@ -154,10 +170,21 @@ def write_config(
     for k, sidecar in enumerate(read):
         every = series.every(sidecar, 1)
         _link(requests[k].folder, links[k])
+        for old in _old_links(requests[k].folder, shot_names[k], format_):
+            if old.name not in links[k]:
+                old.unlink()
         ends = (every[0], every[-1])
         shots.append(Shot(shot_names[k], str(sidecars[k]), spaces[k], *ends, baked[k], between[k]))
 
     notes = relocate(config, base, archive, folder)
+    if process_space is not None:
+        given = config.getColorSpace(process_space).getName()
+        known = [shot for shot in shots if shot.process_space != given]
+        notes += [
+            f"look {shot.name}: the config knows its encoding, {shot.process_space}; "
+            f"{Arg('process_space')} is for the others"
+            for shot in known
+        ]
     for shot, sidecar, chosen in zip(shot_names, read, frames, strict=True):
         if not format_.is_cdl and (lacks := without_windows(sidecar, chosen)):
             notes.append(f"look {shot}: {lacks}")
@@ -219,16 +246,16 @@ def _refuse_failed(names: list[str], baked: list[series.Series]) -> None:
 
 
 def _between(
-    sidecars: list[Path], frames: list[tuple[int, ...]], strength: float, clip: str | None
+    stored: list[SidecarBytes], frames: list[tuple[int, ...]], strength: float, clip: str | None
 ) -> list[BetweenError | None]:
     """Return the errors between the frames of each sidecar; a command's child reads its clip."""
     errors = []
-    for file, baked in zip(sidecars, frames, strict=True):
+    for one, baked in zip(stored, frames, strict=True):
         if sandbox.of_command():
-            with Child(reads=files_of_sidecar(file, clip)) as child:
-                errors.append(child.call(between_error, file, baked, strength, clip))
+            with Child(reads=files_of_sidecar(one.path, clip)) as child:
+                errors.append(child.call(between_error, one, baked, strength, clip))
         else:
-            errors.append(between_error(file, baked, strength, clip))
+            errors.append(between_error(one, baked, strength, clip))
     return errors
 
 
@@ -247,12 +274,44 @@ def _refuse_far(names: list[str], between: list[BetweenError | None]) -> None:
         )
 
 
-def _remove_links(luts: Path, name: str, format_: LutFormat) -> None:
-    """Remove the links of an earlier config; its LUTs stay."""
-    if luts.is_dir():
-        for entry in luts.glob(f"{glob.escape(name)}.*{format_.extension}"):
-            if entry.is_symlink():
-                entry.unlink()
+def _names_of(name: str, format_: LutFormat) -> str:
+    """Return the pattern of a shot's files."""
+    return f"{glob.escape(name)}.*{format_.extension}"
+
+
+def _old_links(luts: Path, name: str, format_: LutFormat) -> list[Path]:
+    """Return the links of a shot's looks."""
+    if not luts.is_dir():
+        return []
+    entries = luts.glob(_names_of(name, format_))
+    return [entry for entry in entries if entry.is_symlink()]
+
+
+def _part(link: Path, names: str) -> None:
+    """Make a link a file of its own: the earlier config shows the same until a look replaces it.
+
+    Links to other files than looks beside it, whose names match `names`, are removed.
+    """
+    leads = link.readlink()
+    try:
+        if leads.parts != (leads.name,) or not fnmatch.fnmatchcase(leads.name, names):
+            raise FileNotFoundError
+        names_of_flags = ("O_BINARY", "O_NOFOLLOW", "O_NONBLOCK")  # as far as the system has them
+        flags = os.O_RDONLY | sum(getattr(os, flag, 0) for flag in names_of_flags)
+        with os.fdopen(os.open(link.with_name(leads.name), flags), "rb") as look:
+            about = os.fstat(look.fileno())
+            if not stat.S_ISREG(about.st_mode) or about.st_nlink > 1:
+                raise FileNotFoundError
+            data = look.read()
+    except OSError:
+        link.unlink()
+        return
+    with temporary_folder(link.parent) as temporary:
+        copy = temporary / link.name
+        copy.touch(0o600)
+        copy.write_bytes(data)
+        copy.chmod(stat.S_IMODE(about.st_mode))
+        copy.replace(link)
 
 
 def _links(

@@ -35,14 +35,18 @@ def space_of_sidecar(config: Any, base: str, sidecar: _core.Sidecar, wanted: str
     """Return the name of the config's colour space for a sidecar's code values.
 
     The lookup is by name, alias or role, under every name of the encoding. Otherwise OpenColorIO
-    looks for a colour space that converts alike, if the config has the roles for that.
+    looks for a colour space that converts alike, if the config has the roles for that. Where the
+    config does not know the encoding, `wanted` names the colour space.
     """
     import PyOpenColorIO as ocio
 
+    given = ""
     if wanted is not None:
-        return str(colour_space(config, base, wanted, Arg("process_space", wanted)).getName())
+        given = str(colour_space(config, base, wanted, Arg("process_space", wanted)).getName())
     encoding = str(sidecar.clip["encoding"])
     if encoding.strip().lower() in ("", "unknown"):
+        if given:
+            return given
         raise Palette4dError(
             f"the sidecar of {sidecar.clip['name']!r} does not say in which encoding its colours "
             f"are; name a colour space of the config with {Arg('process_space')}"
@@ -59,6 +63,8 @@ def space_of_sidecar(config: Any, base: str, sidecar: _core.Sidecar, wanted: str
             missing = [role for role in roles if not config.hasRole(role)]
             if missing:
                 lacking = f"; it lacks the role {missing[0]}, which could identify one"
+    if given:
+        return given
     raise Palette4dError(
         f"{base}: found no colour space for {encoding!r}{lacking}; name one with "
         f"{Arg('process_space')}, such as {near_spaces(config, encoding)}"

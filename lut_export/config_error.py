@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.lut_export import lut3d, series
+from palette4d.lut_export.bake import SidecarBytes
 from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.shaper import choose
 
@@ -51,7 +52,7 @@ def nearest(baked: tuple[int, ...], frame: int) -> int:
 
 
 def between_error(
-    path: Path,
+    source: Path | SidecarBytes,
     baked: tuple[int, ...],
     strength: float = 1.0,
     clip: str | None = None,
@@ -61,7 +62,8 @@ def between_error(
     `baked` are the frames that have a look, in rising order. Without `clip` the sidecar's clip is
     used.
     """
-    sidecar = _core.read_sidecar(str(path))
+    read = SidecarBytes.of(source)
+    sidecar = read.parsed()
     own = set(baked)
     between = [frame for frame in series.every(sidecar, 1) if frame not in own]
     if not between:
@@ -84,7 +86,7 @@ def between_error(
         if all(edit.identity for edit in edits):
             error = BetweenError(0.0, frame, look, on_clip=False)
         else:
-            colours, on_clip = _colours(path, sidecar, frame, clip)
+            colours, on_clip = _colours(read.path, sidecar, frame, clip)
             here, there = (viewing.lab(edit.exact(colours)) for edit in edits)
             largest = float(delta_e_2000(here, there).max(initial=0.0))
             error = BetweenError(largest, frame, look, on_clip)

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.lut_export.bake import bake, check_settings, check_target
+from palette4d.lut_export.bake import SidecarBytes, bake, check_settings, check_target
 from palette4d.lut_export.formats import format_named
 from palette4d.lut_export.frame_edit import frame_text
 from palette4d.lut_export.measured_write import BakeSettings
@@ -64,7 +64,7 @@ class Request:
     force : replace files that differ.
     """
 
-    sidecar: Path
+    sidecar: Path | SidecarBytes
     folder: Path
     frames: tuple[int, ...]
     settings: BakeSettings
@@ -101,7 +101,7 @@ class Series:
 class FrameTask:
     """One file to bake; can be sent to another process or machine."""
 
-    sidecar: Path
+    sidecar: SidecarBytes
     frame: int
     file: str
     settings: BakeSettings
@@ -278,7 +278,9 @@ def _files(requests: Sequence[Request]) -> list[Path]:
     """Return what the processes that bake must read."""
     files: list[Path] = []
     for request in requests:
-        files += files_of_sidecar(request.sidecar, request.clip)
+        own = request.sidecar
+        file = own.path if isinstance(own, SidecarBytes) else own
+        files += files_of_sidecar(file, request.clip)
         files += files_of_config(request.settings.ocio_config or os.environ.get("OCIO") or "")
     return list(dict.fromkeys(files))
 
@@ -289,7 +291,8 @@ class _Export:
     def __init__(self, request: Request) -> None:
         """Check the request before the first frame is baked."""
         self.request, settings = request, request.settings
-        sidecar = _core.read_sidecar(str(request.sidecar))
+        read = SidecarBytes.of(request.sidecar)
+        self.file, sidecar = read.path, read.parsed()
         assert settings.format is not None
         format_ = format_named(settings.format)
         frames = check_frames(sidecar, request.frames)
@@ -297,7 +300,7 @@ class _Export:
             check_settings(settings, format_, sidecar, frame)
         name = checked_name(request.name) if request.name else file_safe(sidecar.clip["name"])
         self.index = request.folder / f"{name}.series.json"
-        self.header = header_of(sidecar, request.sidecar, settings)
+        self.header = header_of(sidecar, self.file.name, read.data, settings)
         known = read_index(self.index, self.header, request.force)
         names = {f: file_name(name, f, request.padding, format_.extension) for f in frames}
         self.kept = [f for f in frames if _matches(request.folder / names[f], known.get(f))]
@@ -306,12 +309,12 @@ class _Export:
             target = request.folder / names[frame]
             if target.exists():
                 # A file without an entry may match: a killed export may have left it.
-                check_target(target, request.force or frame not in known, request.sidecar)
-        # Absolute: other processes may have another working folder.
+                check_target(target, request.force or frame not in known, self.file)
+        # Absolute: other processes may have another working folder. All bake the grade of now.
         clip = None if request.clip is None else str(Path.cwd() / request.clip)
         settings = replace(settings, ocio_config=from_anywhere(settings.ocio_config))
-        path = request.sidecar.absolute()
-        self.tasks = {f: FrameTask(path, f, names[f], settings, clip) for f in todo}
+        read = replace(read, path=self.file.absolute())
+        self.tasks = {f: FrameTask(read, f, names[f], settings, clip) for f in todo}
         self.entries = {f: entry for f, entry in known.items() if f not in self.tasks}
         self.baked: list[int] = []
         self.failed: dict[int, str] = {}
@@ -329,7 +332,8 @@ class _Export:
             return
         entry, data = outcome
         try:
-            _put(self.request.folder / self.tasks[frame].file, data, self.request)
+            target = self.request.folder / self.tasks[frame].file
+            _put(target, data, self.file, self.request.force)
         except WriteError:
             raise  # all other files would fail, too
         except Palette4dError as error:
@@ -362,12 +366,12 @@ def bake_frame(task: FrameTask, threads: int) -> tuple[Entry, bytes]:
         return entry_of(path, result), path.read_bytes()
 
 
-def _put(target: Path, data: bytes, request: Request) -> None:
+def _put(target: Path, data: bytes, sidecar: Path, force: bool) -> None:
     """Write a file atomically; one with the same bytes is kept."""
     if target.is_file() and target.read_bytes() == data:
         return
-    check_target(target, request.force, request.sidecar)
-    with replacing(target, force=request.force) as temporary:
+    check_target(target, force, sidecar)
+    with replacing(target, force=force) as temporary:
         temporary.write_bytes(data)
 
 

@@ -28,8 +28,10 @@ _CHANGED = {
 }
 
 
-def header_of(sidecar: _core.Sidecar, path: Path, settings: BakeSettings) -> dict[str, Any]:
-    """Return the index members for all files: the sidecar's state and the settings."""
+def header_of(
+    sidecar: _core.Sidecar, name: str, data: bytes, settings: BakeSettings
+) -> dict[str, Any]:
+    """Return the index members for all files: the sidecar's file, its bytes, and the settings."""
     clip = sidecar.clip
     options = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(settings).items()}
     return {
@@ -37,8 +39,8 @@ def header_of(sidecar: _core.Sidecar, path: Path, settings: BakeSettings) -> dic
         "version": VERSION,
         "generator": f"palette4d {_core.__version__}",
         "sidecar": {
-            "file": path.name,
-            "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+            "file": name,
+            "sha256": hashlib.sha256(data).hexdigest(),
         },
         "clip": {
             "name": clip["name"],

@@ -42,6 +42,7 @@ def warnings(
     farthest: Mapping[str, float],
     *,
     brightest: float,
+    linear: str = "",
 ) -> tuple[Message, ...]:
     """Return the warnings about a palette.
 
@@ -52,12 +53,16 @@ def warnings(
     farthest : the distance of the farthest pixel outside, by stage.
     brightest : the largest code value of the palette. Above `BRIGHT` the clip may be scene-linear,
         where distances mean little: that is then the only warning.
+    linear : the encoding of the palette, if that is scene-linear.
     """
-    if brightest > BRIGHT:
+    if linear or brightest > BRIGHT:
+        why = f"the clip has code values up to {brightest:.3g}: if it is scene-linear,"
+        if linear:
+            why = f"the clip is scene-linear ({linear}):"
         text = (
-            f"the clip has code values up to {brightest:.3g}: if it is scene-linear, these figures "
-            f"mean little; give its colour space with {Arg('input_space')} (such as ACEScg), and "
-            f"leave out {Arg('palette_space')}: the palette is then found in a log encoding"
+            f"{why} these figures mean little; give its colour space with {Arg('input_space')} "
+            f"(such as ACEScg), and leave out {Arg('palette_space')}: the palette is then found in "
+            "a log encoding"
         )
         return (Message(text),)
     texts = (

@@ -91,7 +91,8 @@ private:
     bool started_ = false;
 };
 
-/// The frames in a folder of their own; removed again unless all are there.
+/// The frames in a folder beside the sidecar. They are written into another one, which takes its
+/// place when all are there.
 class Frames {
 public:
     explicit Frames(const fs::path& sidecar) {
@@ -104,17 +105,14 @@ public:
         }
         name_ = name;
         folder_ = sidecar.parent_path() / native(name + ".frames");
+        fresh_ = sidecar.parent_path() / native(name + ".frames.new");
     }
     ~Frames() {
-        if (keep) return;
-        std::error_code error;
-        for (const fs::path& file : written_) fs::remove(file, error);
-        if (made_) fs::remove(reachable(folder_), error);
+        if (made_) clear(fresh_);
     }
     Frames(const Frames&) = delete;
     Frames& operator=(const Frames&) = delete;
 
-    bool keep = false;
     const fs::path& folder() const { return folder_; }
     bool found() const {
         std::error_code error;
@@ -122,38 +120,71 @@ public:
     }
     std::string pattern() const { return (folder_ / native(name_ + ".######.exr")).u8string(); }
 
-    /// Makes the folder, without the frames of an earlier time; false where other files are in it,
-    /// or where it cannot be made.
+    /// Makes the folder to write to; false where a folder has other files, or cannot be made.
     bool make() {
         std::error_code error;
-        made_ = fs::create_directories(reachable(folder_), error);
-        std::vector<fs::path> old;
-        for (const auto& entry : fs::directory_iterator(reachable(folder_), error)) {
-            const std::string file = entry.path().filename().u8string();
-            const std::string start = name_ + ".", end = ".exr";
-            const bool ours =
-                file.size() == start.size() + 6 + end.size() && file.rfind(start, 0) == 0 &&
-                file.find_first_not_of("0123456789", start.size()) == start.size() + 6 &&
-                file.compare(start.size() + 6, end.size(), end) == 0;
-            if (!ours) return false;
-            old.push_back(entry.path());
-        }
-        for (const fs::path& file : old) fs::remove(file, error);
-        return !error;
+        if (found() && !ours(folder_)) return false;
+        if (fs::exists(reachable(fresh_), error) && !clear(fresh_)) return false;  // of a crash
+        made_ = fs::create_directories(reachable(fresh_), error);
+        return made_ && !error;
     }
     bool write(long number, const Image& image) {
         std::string digits = std::to_string(number);
         digits.insert(0, 6 - std::min<std::size_t>(6, digits.size()), '0');
-        written_.push_back(reachable(folder_ / native(name_ + "." + digits + ".exr")));
-        return write_exr(written_.back(), image);
+        return write_exr(reachable(fresh_ / native(name_ + "." + digits + ".exr")), image);
+    }
+    /// Replaces the frames of an earlier time; false where they cannot be.
+    bool finish() {
+        std::error_code error;
+        if (found() && !clear(folder_)) return false;
+        fs::rename(reachable(fresh_), reachable(folder_), error);
+        made_ = static_cast<bool>(error);
+        return !error;
     }
 
 private:
+    /// The frames in a folder; empty where other files are in it too.
+    std::optional<std::vector<fs::path>> ours(const fs::path& folder) const {
+        std::error_code error;
+        std::vector<fs::path> files;
+        for (const auto& entry : fs::directory_iterator(reachable(folder), error)) {
+            const std::string file = entry.path().filename().u8string();
+            const std::string start = name_ + ".", end = ".exr";
+            const bool frame =
+                file.size() == start.size() + 6 + end.size() && file.rfind(start, 0) == 0 &&
+                file.find_first_not_of("0123456789", start.size()) == start.size() + 6 &&
+                file.compare(start.size() + 6, end.size(), end) == 0;
+            if (!frame) return std::nullopt;
+            files.push_back(entry.path());
+        }
+        if (error) return std::nullopt;
+        return files;
+    }
+    /// Removes a folder of frames; false where other files are in it, or where it stays.
+    bool clear(const fs::path& folder) const {
+        std::error_code error;
+        const auto files = ours(folder);
+        if (!files) return false;
+        for (const fs::path& file : *files) fs::remove(file, error);
+        return fs::remove(reachable(folder), error);
+    }
+
     std::string name_;
-    fs::path folder_;
+    fs::path folder_, fresh_;
     bool made_ = false;
-    std::vector<fs::path> written_;
 };
+
+/// Why a sidecar that is there is not replaced; or nothing.
+std::string refused_sidecar(const std::string& target) {
+    std::error_code error;
+    if (!fs::exists(reachable(native(target)), error)) return "";
+    try {
+        if (!has_edits(read_sidecar(target))) return "";
+    } catch (const SidecarError&) {
+        return target + ": found a file that is no sidecar; enter another path";
+    }
+    return target + ": found edits, which are never replaced; enter another path, or move it away";
+}
 
 /// The times of the source's first and last frame.
 std::optional<std::pair<long, long>> source_range(const Suites& suites,
@@ -184,6 +215,10 @@ std::string analyse(const Suites& suites, OfxImageEffectHandle effect, const std
     if (!sidecar.is_absolute() || !fs::is_directory(reachable(sidecar.parent_path()), error)) {
         return target + ": found no such folder; enter the path of the new sidecar in full";
     }
+    for (const auto check : {refused_target, refused_sidecar}) {
+        const std::string refused = check(target);
+        if (!refused.empty()) return refused;
+    }
     const auto range = source_range(suites, effect);
     if (!range) return "the host does not report the frames of the input; connect a clip";
     const auto [first, last] = *range;
@@ -210,9 +245,12 @@ std::string analyse(const Suites& suites, OfxImageEffectHandle effect, const std
             }
         }
     }
-    const std::string problem = start_analysis(frames.pattern(), target);
-    frames.keep = problem.empty();
-    return problem;
+    if (!frames.finish()) {
+        return frames.folder().u8string() +
+               ": cannot be replaced; close the programs that use it, or enter another name for "
+               "the sidecar";
+    }
+    return start_analysis(frames.pattern(), target);
 }
 
 bool exists(const std::string& file) {

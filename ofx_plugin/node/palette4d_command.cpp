@@ -236,7 +236,22 @@ std::string studio_problem(const std::string& path) {
     return found == all.failures.end() ? "" : found->second;
 }
 
+std::string refused_target(const std::string& sidecar) {
+    const fs::path path = native(in_full(sidecar));
+    std::error_code error;
+    fs::path folder = fs::canonical(reachable(path.parent_path()), error);
+    if (error) folder = path.parent_path().lexically_normal();
+    const std::string name = path.filename().u8string(), ending = ".json";
+    const bool json = name.size() > ending.size() &&
+                      name.compare(name.size() - ending.size(), ending.size(), ending) == 0;
+    if (json && name[0] != '.' && folder.filename().u8string().rfind('.', 0) != 0) return "";
+    return sidecar + ": expected a name such as shot.p4d.json, in a folder that is not hidden; " +
+           "enter another path";
+}
+
 std::string start_analysis(const std::string& clip, const std::string& sidecar) {
+    std::string problem = refused_target(sidecar);
+    if (!problem.empty()) return problem;
     Analyses& all = analyses();
     const std::string key = key_of(sidecar);
     const std::lock_guard<std::mutex> lock(all.mutex);
@@ -244,7 +259,6 @@ std::string start_analysis(const std::string& clip, const std::string& sidecar) 
     one.clip = clip;
     one.folder = temporary_folder();
     if (one.folder.empty()) return "no folder can be made for temporary files";
-    std::string problem;
     const std::vector<std::string> line =
         command({"analyze", in_full(clip), "-o", in_full(sidecar), "--quiet", "--progress",
                  (one.folder / "progress").u8string()},

@@ -14,6 +14,10 @@ std::string open_in_studio(const std::string& path, std::optional<double> frame)
 /// waits.
 std::string studio_problem(const std::string& path);
 
+/// Why no analysis writes there; or nothing. A project may come from a stranger: what it names is a
+/// sidecar by its name, where no shell or program reads files when it starts.
+std::string refused_target(const std::string& sidecar);
+
 /// Starts `palette4d analyze CLIP -o SIDECAR`, whose rules say when a file is replaced. One runs at
 /// a time for each sidecar. Returns what went wrong, or nothing.
 std::string start_analysis(const std::string& clip, const std::string& sidecar);

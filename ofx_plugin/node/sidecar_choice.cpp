@@ -200,8 +200,9 @@ std::string keep_files(const Params& params, Chosen& chosen, const std::string& 
                (chosen.broken.empty() ? "there is no file" : chosen.broken);
     }
     if (!loaded) return "";
+    // What was loaded, not what a program writes there now.
     const std::optional<std::string> file = sidecar_text(chosen.path);
-    if (!file) return "";
+    if (!file || revision_of(*file) != loaded->revision()) return "";
     note_text(params, kParamEmbedded, *file);
     return params.string_now(kParamEmbedded) == file
                ? "a copy is in the project"

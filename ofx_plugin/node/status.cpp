@@ -28,9 +28,14 @@ std::string counted(std::size_t count, const char* one, const char* many) {
     return std::to_string(count) + " " + (count == 1 ? one : many);
 }
 
+std::size_t handle_edits(const Edits& edits) {
+    std::size_t count = edits.stops.size();
+    for (const std::optional<Vec3>& rgb : edits.vertex_rgb) count += rgb.has_value();
+    return count;
+}
+
 std::string describe(const Sidecar& sidecar) {
-    std::size_t edits = sidecar.edits.stops.size();
-    for (const std::optional<Vec3>& rgb : sidecar.edits.vertex_rgb) edits += rgb.has_value();
+    const std::size_t edits = handle_edits(sidecar.edits);
     const ClipInfo& clip = sidecar.clip;
     std::ostringstream text;
     text.imbue(std::locale::classic());
@@ -114,6 +119,11 @@ std::string without_controls(const std::string& text) {
     return result;
 }
 
+bool has_edits(const Sidecar& sidecar) {
+    return handle_edits(sidecar.edits) > 0 || !sidecar.edits.picks.empty() ||
+           !sidecar.versions.empty();
+}
+
 std::string words_of_picture(const Sidecar& sidecar, const std::string& picture) {
     std::string text = "expects the picture in " + picture;
     if (picture != sidecar.clip.encoding) text += "; the palette is in " + sidecar.clip.encoding;
@@ -148,8 +158,13 @@ std::string status_of(const Chosen& chosen, const std::vector<std::string>& firs
         lines.insert(lines.end(), last.begin(), last.end());
     }
     std::string text;
-    for (const std::string& line : lines) {
-        if (!line.empty()) text += (text.empty() ? "" : "\n") + line;
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+        if (lines[i].empty()) continue;
+        if (!text.empty()) text += '\n';
+        // A name of the file's begins no line; errors of programs may have several.
+        for (const char c : lines[i]) {
+            text += c == '\n' && i >= first.size() ? std::string("\\n") : std::string(1, c);
+        }
     }
     return without_controls(text);
 }

@@ -8,6 +8,9 @@
 
 namespace palette4d::node {
 
+/// Whether it has edits or versions.
+bool has_edits(const Sidecar& sidecar);
+
 /// Which encoding the node's picture must have.
 std::string words_of_picture(const Sidecar& sidecar, const std::string& picture);
 

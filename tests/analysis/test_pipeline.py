@@ -248,3 +248,13 @@ def test_blocks_are_limited():
     for most in (1, 2):
         analysis = pipeline.find_polytope(frames, AnalysisOptions(blocks=most))
         assert len(analysis.polytope.blocks) <= most
+
+
+def test_numbers_that_no_sidecar_holds_are_refused_at_once() -> None:
+    clip = ArrayClip(np.full((2, 4, 4, 3), 0.5, np.float32), first=20_261_128_100_000)
+
+    def never(*_: object) -> None:
+        raise AssertionError
+
+    with pytest.raises(Palette4dError, match="found the frame number 20261128100001"):
+        pipeline.analyze(clip, progress=never)

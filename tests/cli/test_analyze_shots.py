@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.resources
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from typing import Any
 
 import jsonschema
 import opentimelineio as otio
+import PyOpenColorIO as ocio
 import pytest
 from any_clips import harbour
 from clip_files import write_image
@@ -274,9 +276,12 @@ class TestAgain:
         recolour(edited)
         mine = edited.read_bytes()
         assert analyze(cut_movie, out, "--detect-shots", "--set", "palette_size=5") == 1
-        assert "rushes_s001: " in capsys.readouterr().err
+        assert re.search(
+            r"1 shot has edits .*: rushes_s001; .*--keep-edits", capsys.readouterr().err
+        )
+        # The show can still be exported.
         assert edited.read_bytes() == mine
-        assert [status for _, status, _ in shots(out)] == ["failed", "done"]
+        assert [status for _, status, _ in shots(out)] == ["done", "done"]
         assert analyze(cut_movie, out, "--detect-shots", "--force", "--keep-edits") == 0
         assert edited.read_bytes() == mine
         assert (
@@ -432,6 +437,42 @@ class TestColourSpaces:
         ):
             assert analyze(cut_movie, out, "--detect-shots", *words) == 0
             assert done in capsys.readouterr().out
+        assert "conversion" not in sidecar(out, "rushes_s001")["clip"]
+
+    def test_a_shot_of_another_space(
+        self, cut_movie: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        out = tmp_path / "shots"
+        one = ("--only", "rushes_s002")
+        for words, done in (
+            ((), "2 analysed, 0 kept"),
+            ((*one, "--input-space", "ACEScg"), "1 analysed, 1 kept"),
+            ((), "0 analysed, 2 kept"),
+            (("--force",), "2 analysed, 0 kept"),
+            (("--input-space", "ACES2065-1"), "1 analysed, 1 kept"),
+            ((*one, "--input-space", "ACES2065-1"), "1 analysed, 1 kept"),
+            (("--input-space", "ACEScg"), "2 analysed, 0 kept"),
+            ((*one, "--input-space", "ACES2065-1"), "1 analysed, 1 kept"),
+            (one, "1 analysed, 1 kept"),
+        ):
+            assert analyze(cut_movie, out, "--detect-shots", *words) == 0
+            assert done in capsys.readouterr().out, words
+            own = manifest(out)["shots"][1].get("input_space")
+            space = sidecar(out, "rushes_s002")["clip"].get("conversion", {}).get("input_space")
+            assert space == (own or manifest(out)["options"].get("input_space"))
+
+    def test_a_shot_of_another_config(self, cut_movie: Path, tmp_path: Path) -> None:
+        out, own = tmp_path / "shots", tmp_path / "own.ocio"
+        config = ocio.Config.CreateFromBuiltinConfig("ocio://studio-config-latest")
+        config.addColorSpace(ocio.ColorSpace(name="mine", encoding="sdr-video"))
+        own.write_text(config.serialize(), "utf-8")
+        spaces = ("--input-space", "mine", "--palette-space", "ACEScct", "--ocio-config", str(own))
+        assert analyze(cut_movie, out, "--detect-shots") == 0
+        assert analyze(cut_movie, out, "--detect-shots", "--only", "rushes_s002", *spaces) == 0
+        before = sidecar(out, "rushes_s002")
+        assert before["clip"]["conversion"]["config"] == str(own)
+        assert analyze(cut_movie, out, "--detect-shots", "--force") == 0
+        assert sidecar(out, "rushes_s002") == before
         assert "conversion" not in sidecar(out, "rushes_s001")["clip"]
 
     def test_an_unknown_space_fails_each_shot(

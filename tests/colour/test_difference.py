@@ -113,6 +113,15 @@ def test_linear_light_is_not_taken_as_srgb() -> None:
     np.testing.assert_allclose(viewing_of("ACEScg").lab(grey)[0, 1:], 0, atol=0.05)
 
 
+def test_displays_show_nothing_beyond_their_range() -> None:
+    beyond, shown = np.array([[1.3, -0.2, 0.5]]), np.array([[1.0, 0.0, 0.5]])
+    for encoding in ("sRGB", "Rec.709", "unknown"):
+        lab = viewing_of(encoding).lab
+        assert delta_e_2000(lab(beyond), lab(shown))[0] < 0.01
+    lab = viewing_of("ACEScg").lab
+    assert delta_e_2000(lab(beyond), lab(shown))[0] > 1
+
+
 def test_negative_and_bright_light_is_finite() -> None:
     light = np.array([[-0.5, 0.2, 60.0], [50.0, 50.0, 50.0]])
     lab = viewing_of("lin_rec709").lab(light)

@@ -111,6 +111,17 @@ def touching() -> NDArray[np.float64]:
     return picture
 
 
+@pytest.mark.parametrize(("half", "told"), [(6, True), (30, False)])
+def test_beside_a_small_thing_small_areas_are_named(
+    monkeypatch: pytest.MonkeyPatch, half: int, told: bool
+) -> None:
+    picture = np.tile(GREY, (H, W, 1))
+    picture[60 - half : 60 + half, 40 - half : 40 + half] = RED
+    picture[30:38, 140:148] = RED  # 0.3 % of the frame
+    found = answer(document_of(monkeypatch, picture))
+    assert (note(found, "its colour elsewhere") is not None) == told
+
+
 def test_a_larger_thing_that_touches_is_warned_of(monkeypatch: pytest.MonkeyPatch) -> None:
     document = document_of(monkeypatch, touching())
     document.pick(0, pixel=(95.0, 45.0), box=9, to="#2040b0", reach=2)

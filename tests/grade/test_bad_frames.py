@@ -221,9 +221,31 @@ class TestAgain:
         assert any("3 damaged" in note for note in done.notes)
         assert (tmp_path / f"o.1.{extension}").stat().st_size == len(whole)  # EXR has its time
         assert render(sidecar, clip, out, skip_existing=True, **NONE).frames == []
+        if os.name != "nt":  # an earlier grade comes back with its time
+            earlier = tmp_path / "earlier.p4d.json"
+            earlier.write_bytes(PLAIN.read_bytes())
+            os.utime(earlier, (0, 0))
+            earlier.replace(sidecar)
+            assert render(sidecar, clip, out, skip_existing=True, **NONE).frames == [1, 2, 3, 4]
         later = (tmp_path / f"o.2.{extension}").stat().st_mtime + 10
         os.utime(sidecar, (later, later))
         assert render(sidecar, clip, out, skip_existing=True, **NONE).frames == [1, 2, 3, 4]
+
+    @pytest.mark.parametrize("output", ["o.#.png", "o.mov"])
+    def test_what_is_of_the_grade_before_an_edit_is_rendered_again(
+        self, tmp_path: Path, output: str
+    ) -> None:
+        sidecar = tmp_path / "s.p4d.json"
+        sidecar.write_bytes(PLAIN.read_bytes())
+        clip = sequence(tmp_path / "in", [1, 2, 3])
+
+        def edit(*_: int) -> None:
+            sidecar.write_bytes(PLAIN.read_bytes())
+
+        render(sidecar, clip, tmp_path / output, progress=edit, **NONE)
+        assert render(sidecar, clip, tmp_path / output, skip_existing=True, **NONE).frames
+        again = render(sidecar, clip, tmp_path / output, skip_existing=True, **NONE)
+        assert again.frames == []
 
     def test_a_movie_stays_if_it_is_whole(
         self, tmp_path: Path, capsys: pytest.CaptureFixture

@@ -1,6 +1,7 @@
 """Copied grades: the look of one palette for another, and for a new analysis of the same clip."""
 
 import copy
+import re
 from pathlib import Path
 from typing import Any
 
@@ -350,6 +351,20 @@ def test_a_few_pixels_of_a_colour_or_a_rim_are_no_thing(
     assert (found is not None) == there
     if found is not None:
         assert (found.frame, found.rgb) == (1, pytest.approx(pick.rgb, abs=1e-6))
+
+
+def test_what_is_nowhere_in_a_clip_changes_nothing_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    source = Document(members("split"))
+    source.pick(frame=8, colour=(0.9, 0.1, 0.8), by=(0.2, 0, 0), follow=False)
+    target = graded()
+    first, last, step = target.grade.frames
+    width, height = target.grade.members["clip"]["size"]
+    grey = np.full((last - first + 1, height, width, 3), 0.4, np.float32)
+    assert (first, step) == (0, 1)
+    monkeypatch.setattr("palette4d.grade.clip_of_picks.find_clip", lambda *_: ArrayClip(grey))
+    before, steps = target.grade.state, target.history
+    assert re.search(r"not copied, since .*p1 .*; the edits stay", str(target.copy_from(source)))
+    assert (target.grade.state, target.history) == (before, steps)
 
 
 def test_a_window_stays_with_its_clip() -> None:

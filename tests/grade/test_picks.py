@@ -10,7 +10,7 @@ from grade.test_answer import document_of
 
 import palette4d
 from palette4d.common.errors import Palette4dError, SidecarError
-from palette4d.grade import later, mattes, pick_edits, sidecar
+from palette4d.grade import later, mattes, pick_edits, rendering, sidecar
 from palette4d.grade.clip_colours import ClipColours
 from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.document import Document
@@ -350,6 +350,7 @@ def test_a_window_is_followed_when_the_clip_is_read(monkeypatch: pytest.MonkeyPa
     document.history = later.as_unread(document.history)
     made, step = document.grade, document.history.done[-1]
     assert made.pick("p1").window == Window(2.8, (WindowKey(0, BOX, True),))
+    assert rendering.unread_picks(document) == ["p1"]
     # The program that made it ended: the next one does it again.
     trial = Document(before)
     later.do_again(trial, step, ClipOfPicks.of(before), None)
@@ -361,6 +362,7 @@ def test_a_window_is_followed_when_the_clip_is_read(monkeypatch: pytest.MonkeyPa
     grade, history = later.completed(made, document.history, steps, readings, {})
     assert grade.pick("p1") == trial.grade.pick("p1")
     assert not history.done[-1].unread
+    assert rendering.unread_picks(trial) == []
 
 
 @pytest.mark.parametrize("kept", [False, True])

@@ -125,6 +125,32 @@ TEST(a_cancelled_fetch_leaves_nothing) {
     CHECK(!fs::exists(folder() / "shot.frames") && !effect.started());
 }
 
+TEST(a_fetch_that_fails_leaves_the_earlier_frames) {
+    Effect effect;
+    write("go", R"({"error": ["it has cuts"]})"
+                "\n");
+    effect.push();
+    CHECK(soon([&] { return effect.status().find("failed: it has cuts") != std::string::npos; }));
+    fill(effect.pictures[3], 9, false);
+    const auto frame = [&] { return text_of(folder() / "shot.frames" / "shot.000003.exr"); };
+    const std::string before = frame();
+    const Picture last = effect.pictures.back();
+    effect.pictures.pop_back();
+    effect.push();
+    EXPECT(effect.node->text("status").find("no picture at time 2") != std::string::npos,
+           effect.node->text("status"));
+    CHECK(effect.files() == 4 && frame() == before);
+    CHECK(!fs::exists(folder() / "shot.frames.new"));
+    // Of a host that ended meanwhile.
+    fs::create_directories(folder() / "shot.frames.new");
+    write("shot.frames.new/shot.000009.exr", "half of it");
+    effect.pictures.push_back(last);
+    effect.push();
+    CHECK(effect.files() == 4 && frame() != before && !frame().empty());
+    CHECK(!fs::exists(folder() / "shot.frames.new"));
+    CHECK(soon([&] { return effect.status().find("failed: it has cuts") != std::string::npos; }));
+}
+
 TEST(a_fetch_without_the_progress_suite) {
     Config config;
     config.missing_suites = {std::string(kOfxProgressSuite) + "/1"};
@@ -148,10 +174,19 @@ TEST(a_fetch_that_cannot_be_says_why) {
     refused("found no such folder");
     effect.node->set("sidecar", (folder() / "\x1b[2J" / "shot.p4d.json").u8string());
     refused("\\u001b[2J");
+    effect.node->set("sidecar", (folder() / ".bash_profile").u8string());
+    refused("expected a name such as shot.p4d.json");
+    CHECK(effect.asked.empty());
     effect.node->set("sidecar", effect.target.u8string());
     effect.pictures.pop_back();
     refused("no picture at time 2");
     CHECK(!fs::exists(folder() / "shot.frames"));
+    // Nor a sidecar with edits, nor what is none; the frames of an earlier time stay.
+    write("shot.p4d.json", sidecar_text());
+    refused("found edits, which are never replaced");
+    write("shot.p4d.json", "{}");
+    refused("found a file that is no sidecar");
+    fs::remove(effect.target);
     // What is not ours stays.
     fs::create_directories(folder() / "shot.frames");
     write("shot.frames/holiday.exr", "mine");

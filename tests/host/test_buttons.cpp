@@ -415,6 +415,30 @@ TEST(an_analysis_that_fails_says_why) {
     CHECK(soon([&] { return window.says("failed: MemoryError\n"); }));
 }
 
+TEST(an_analysis_writes_what_is_a_sidecar_by_its_name) {
+    Window window;
+    window.node->set("clipFile", (folder() / "shot.mov").u8string());
+    fs::create_directories(folder() / ".bashrc.d");
+    std::vector<std::string> refused = {".bash_profile",  "shot",  "shot.sh",
+                                        ".shot.p4d.json", ".json", ".bashrc.d/shot.p4d.json",
+                                        "sub/.."};
+#if !defined(_WIN32)
+    fs::create_directory_symlink(folder() / ".bashrc.d", folder() / "plain");
+    refused.emplace_back("plain/shot.p4d.json");
+#endif
+    for (const std::string& name : refused) {
+        window.node->set("sidecar", (folder() / name).u8string());
+        window.push("analyse");
+        const std::string status = window.node->text("status");
+        EXPECT(status.find("expected a name such as shot.p4d.json") != std::string::npos, status);
+    }
+    CHECK(!noted());
+    window.node->set("sidecar", (folder() / "." / "shot.p4d.json").u8string());
+    window.push("analyse");
+    CHECK(soon([&] { return window.says("3 of 40"); }));
+    window.push("analyse");
+}
+
 TEST(analyse_needs_to_know_the_clip) {
     Window window;
     window.push("analyse");

@@ -62,7 +62,7 @@ def test_analyse_writes_the_sidecar_and_shows_it(
 
 def test_analyse_keeps_the_programs_rules(strict_host: Path, clip: Path, tmp_path: Path) -> None:
     (bundle,) = install_plugin(tmp_path / "OFX")
-    kept = tmp_path / "notes.txt"
+    kept = tmp_path / "notes.json"
     kept.write_text("no sidecar")
     status = push(strict_host, bundle, "analyse", clipFile=clip, sidecar=kept)
     assert status.startswith(f"the analysis of {clip.parent}/shot.####.png failed: "), status

@@ -121,11 +121,16 @@ TEST(names_from_a_sidecar_do_not_act_on_terminals) {
     const std::string hostile =
         "\"\\u001b[2J\xc2\x9b"
         "31m\xe2\x80\xae\xd8\x9c\xe2\x80\x8f\xc3\xa9\"";
+    std::string lines = text;
     text.replace(text.find(name), name.size(), hostile);
     instance->set("sidecar", write("hostile.p4d.json", text));
     CHECK(instance->changed("sidecar") == kOfxStatOK);
     CHECK(instance->text("status").find(
               "\\u001b[2J\\u009b31m\\u202e\\u061c\\u200f\xc3\xa9: frames") == 0);
+    lines.replace(lines.find(name), name.size(), "\"box\\nfile /forged\"");
+    instance->set("sidecar", write("lines.p4d.json", lines));
+    CHECK(instance->changed("sidecar") == kOfxStatOK);
+    CHECK(instance->text("status").find("box\\nfile /forged: frames") == 0);
     instance->set("sidecar", (folder() / "gone\x1b[2J.p4d.json").u8string());
     CHECK(instance->changed("sidecar") == kOfxStatOK);
     CHECK(instance->text("status").find('\x1b') == std::string::npos);

@@ -1,5 +1,8 @@
 // What a project keeps of its sidecar: a copy, the clip's folder, and the revision.
+#include <atomic>
+#include <chrono>
 #include <set>
+#include <thread>
 
 #include "harness.hpp"
 
@@ -80,6 +83,31 @@ TEST(the_copy_stands_in_for_a_file_that_cannot_be_read) {
     project.instance->set("embedded", std::string("no JSON either"));
     CHECK(project.render() == project.unchanged());
     EXPECT(said.find(path) == 0 && said.find("project") == std::string::npos, said);
+}
+
+TEST(the_copy_is_what_was_loaded_while_a_program_writes_the_file) {
+    Shown project;
+    const std::string path = sidecar(), whole = sidecar_text();
+    project.change("sidecar", path);
+    project.change("embed", 1);
+    std::atomic<bool> done{false};
+    std::thread writer([&] {
+        while (!done) {
+            write("clip.p4d.json", whole.substr(0, whole.size() / 2));
+            std::this_thread::sleep_for(std::chrono::microseconds(200));
+            write("clip.p4d.json", whole);
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        }
+    });
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(1);
+    bool same = true;
+    while (same && std::chrono::steady_clock::now() < end) {
+        CHECK(project.instance->changed("", "", kOfxChangeTime) == kOfxStatOK);
+        same = project.instance->text("embedded") == whole;
+    }
+    done = true;
+    writer.join();
+    EXPECT(same, project.instance->text("embedded"));
 }
 
 TEST(a_broken_copy_is_said_to_be_one) {

@@ -159,7 +159,7 @@ def test_root_installs_nothing_that_a_link_of_another_user_leads_to(
 
 
 @gifts
-@pytest.mark.parametrize("what", ["base", "pth", "module", "settings", "linked"])
+@pytest.mark.parametrize("what", ["base", "pth", "later", "module", "settings", "linked"])
 def test_root_installs_no_environment_of_another_users_python(
     bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
@@ -174,6 +174,8 @@ def test_root_installs_no_environment_of_another_users_python(
         monkeypatch.setattr(sys, "base_prefix", str(theirs))
     elif what == "pth":
         (site / "other.pth").write_text(f"{theirs}\n", "utf-8")
+    elif what == "later":
+        (site / "other.pth").write_text(f"# a comment\n{theirs}/later/lib\n", "utf-8")
     elif what == "module":
         theirs = site / "package" / "theirs"
         theirs.mkdir(parents=True)
@@ -282,6 +284,17 @@ def test_a_file_in_the_folders_place_is_named(bundle: Path, tmp_path: Path) -> N
         install_bundle(bundle, tmp_path / "OFX")
 
 
+def test_a_drive_that_is_not_there_is_named(
+    bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On Windows; elsewhere the root is always there."""
+    gone = Path("D:/gone/OFX" if os.name == "nt" else "/gone/OFX")
+    exists = Path.exists
+    monkeypatch.setattr(Path, "exists", lambda path: path != Path(gone.anchor) and exists(path))
+    with pytest.raises(Palette4dError, match="there is no such drive"):
+        install_bundle(bundle, gone)
+
+
 def test_a_failed_rename_puts_the_old_bundle_back(
     bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -290,7 +303,7 @@ def test_a_failed_rename_puts_the_old_bundle_back(
     rename = Path.rename
 
     def fail_on_the_fresh_one(self: Path, target: Path) -> Path:
-        if self.name == BUNDLE and self.parent.name.endswith(".p4d-tmp"):
+        if self.name != "old" and self.parent.name.endswith(".p4d-tmp"):
             raise OSError(28, "No space left on device")
         return rename(self, target)
 
@@ -320,7 +333,8 @@ def test_the_next_run_removes_what_a_killed_one_left(bundle: Path, tmp_path: Pat
 
     assert install("killed") == -9
     (left,) = destination.iterdir()
-    assert (left / BUNDLE).is_dir()
+    # Hosts look for bundles in hidden folders too, by their names.
+    assert [path.suffix for path in left.iterdir()] == [""]
     with temporary_folder(destination) as used:  # by a run that goes on
         assert [path.name for path in destination.iterdir()] == [used.name]
         assert install("whole") == 0
@@ -361,7 +375,7 @@ def test_says_which_systems_a_bundle_is_for(
 
 
 def test_the_verb_installs_the_packaged_node(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     parser = argparse.ArgumentParser()
     install_plugin.add_parser(parser.add_subparsers())
@@ -373,6 +387,10 @@ def test_the_verb_installs_the_packaged_node(
     assert files(tmp_path / "OFX" / BUNDLE) == files(packaged)
     binary = tmp_path / "OFX" / BUNDLE / "Contents" / architecture() / "Palette4D.ofx"
     assert binary.stat().st_size > 100_000
+    # In the standard's folder hosts look by themselves.
+    monkeypatch.setattr(install_plugin, "system_destination", lambda: tmp_path / "OFX")
+    assert args.run(args) == 0
+    assert "OFX_PLUGIN_PATH" not in capsys.readouterr().out
 
 
 def test_without_a_folder_the_verb_says_first_where_it_installs(

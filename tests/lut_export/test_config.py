@@ -12,7 +12,7 @@ import numpy as np
 import PyOpenColorIO as ocio
 import pytest
 from numpy.typing import NDArray
-from palette4d.lut_export import series
+from palette4d.lut_export import config, series
 from palette4d.lut_export.config import WrittenConfig, write_config
 from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.measured_write import BakeSettings
@@ -135,6 +135,27 @@ def test_frames_between_state_their_error(
     assert finer.delta_e < 0.9 * between.delta_e
 
 
+def test_a_config_is_of_the_grade_of_its_start(
+    shot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Studio may save an edit while the frames between are looked at."""
+    done = write_config([shot], tmp_path / "whole", **options(4))
+    document, between = json.loads(shot.read_text("utf-8")), config.between_error
+
+    def slow(*arguments: Any) -> Any:
+        document["edits"] = {"vertices": [], "stops": []}
+        shot.write_text(json.dumps(document), "utf-8")
+        return between(*arguments)
+
+    monkeypatch.setattr(config, "between_error", slow)
+    edited = write_config([shot], tmp_path / "edited", **options(4))
+    (one,), (other,) = done.shots, edited.shots
+    assert one.between == other.between
+    for frame in (0, 5, 10):
+        seen = [shown(each.path, {"FRAME": str(frame)}, look("cube")) for each in (done, edited)]
+        np.testing.assert_array_equal(*seen)
+
+
 def test_a_stop_between_two_looks_is_found(
     write_sidecar: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -236,6 +257,37 @@ def test_more_tables_replace_links(shot: Path, tmp_path: Path) -> None:
     tables = tmp_path / "show" / "luts" / "cube"
     assert sum(not p.is_symlink() for p in tables.glob("*.clf")) == 6
     assert len(list(tables.glob("*.clf"))) == 12  # 0 to 10, and the default
+
+
+@links
+def test_the_earlier_config_works_where_a_new_one_fails(shot: Path, tmp_path: Path) -> None:
+    done = write_config([shot], tmp_path / "show", **options(4))
+    frames = ["default", *map(str, range(11))]
+    before = [shown(done.path, {"FRAME": frame}, look("cube")) for frame in frames]
+
+    def interrupt(*_: int) -> None:
+        raise KeyboardInterrupt
+
+    for every in (2, 5):
+        with pytest.raises(KeyboardInterrupt):
+            write_config(
+                [shot], tmp_path / "show", **options(every, force=True), progress=interrupt
+            )
+        after = [shown(done.path, {"FRAME": frame}, look("cube")) for frame in frames]
+        # Looks that were baked before the end are the new ones already.
+        same = [np.array_equal(*pair) for pair in zip(before, after, strict=True)]
+        assert sum(same) >= len(frames) - 2
+    # A colleague's link at a look's name leads to no other file.
+    (tmp_path / "private").write_text("mine")
+    (tmp_path / "show/luts/cube/cube.3.clf").unlink(missing_ok=True)
+    (tmp_path / "show/luts/cube/cube.3.clf").symlink_to(tmp_path / "private")
+    with pytest.raises(KeyboardInterrupt):
+        write_config([shot], tmp_path / "show", **options(3, force=True), progress=interrupt)
+    files = (tmp_path / "show/luts/cube").iterdir()
+    assert not any(p.is_file() and p.read_bytes() == b"mine" for p in files)
+    write_config([shot], tmp_path / "show", **options(10, force=True))
+    names = {p.name: p.is_symlink() for p in (tmp_path / "show/luts/cube").glob("*.clf")}
+    assert [names[f"cube.{frame}.clf"] for frame in (0, 1, 9)] == [False, True, True]
 
 
 class TestBase:
@@ -393,6 +445,13 @@ def test_shots_in_two_encodings(write_sidecar: Callable[..., Path], tmp_path: Pa
     for name, path, space in zip("ab", paths, ("sRGB - Texture", "ACEScct"), strict=True):
         got = shown(done.path, {"FRAME": "10"}, look(name, space))
         np.testing.assert_allclose(got, core(path, 10), atol=1e-5)
+    # One whose encoding nobody knows gets the colour space that is given, the others keep theirs.
+    unknown = write_sidecar(lambda c: c, name="c", encoding="unknown")
+    given = options(10, process_space="Linear Rec.709 (sRGB)")
+    done = write_config([*paths, unknown], tmp_path / "three", **given)
+    spaces = ["sRGB - Texture", "ACEScct", "Linear Rec.709 (sRGB)"]
+    assert [s.process_space for s in done.shots] == spaces
+    assert sum("the config knows its encoding" in note for note in done.notes) == 2
 
 
 class TestRefusals:

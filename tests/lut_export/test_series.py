@@ -69,6 +69,25 @@ def test_files_and_index(tmp_path: Path) -> None:
         assert entry["error"] == entry["grid"]["relative_largest"]
 
 
+def test_a_series_is_the_grade_of_its_start(tmp_path: Path) -> None:
+    sidecar = tmp_path / "s.p4d.json"
+    sidecar.write_bytes(EDITED.read_bytes())
+    export(sidecar, tmp_path / "whole", options(0, 4, 9))
+    document = json.loads(EDITED.read_text("utf-8"))
+    document["edits"]["vertices"] = []
+
+    def edit(*_: int) -> None:
+        sidecar.write_text(json.dumps(document), "utf-8")
+
+    request = replace(options(0, 4, 9), sidecar=sidecar, folder=tmp_path / "edited")
+    series.export([request], Workers(1), edit)
+    luts = [
+        {path.name: path.read_bytes() for path in (tmp_path / name).iterdir()}
+        for name in ("whole", "edited")
+    ]
+    assert luts[0] == luts[1]
+
+
 def test_each_file_is_the_edit_of_its_frame(warm_sidecar: Path, tmp_path: Path) -> None:
     document = json.loads(warm_sidecar.read_text("utf-8"))
     # Only the end is edited: the edit grows from frame 0 to 10.

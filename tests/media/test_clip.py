@@ -565,3 +565,13 @@ def test_a_timecode_that_cannot_be_is_none(tmp_path, bits):
         data.replace(struct.pack(f"{order}I", 0x10203004), struct.pack(f"{order}I", bits))
     )
     assert start_timecode(open_clip(str(path))) is None
+
+
+def test_long_texts_are_left_out_of_a_jpeg(tmp_path):
+    """libjpeg ends the program where they are too long."""
+    texts = [("Artist", "string", "A" * 70_000), ("Copyright", "string", "mine")]
+    write_frame(tmp_path / "a.jpg", np.full((9, 9, 3), 0.5, np.float32), "uint8", metadata=texts)
+    (image,) = open_clip(str(tmp_path / "a.jpg")).iter_images()
+    found = {name: value for name, _, value in image.metadata}
+    assert found["Copyright"] == "mine"
+    assert "Artist" not in found

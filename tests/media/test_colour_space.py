@@ -21,6 +21,7 @@ from palette4d.grade import sidecar as sidecars
 from palette4d.grade.document import Document
 from palette4d.media.clip import open_clip
 from palette4d.media.colour_space import SpaceOptions, Spaces, spaces_of
+from palette4d.media.frame_writer import write_frame
 
 STUDIO = "ocio://studio-config-v1.0.0_aces-v1.3_ocio-v2.1"
 NEWEST = "ocio://studio-config-v2.2.0_aces-v1.3_ocio-v2.4"
@@ -266,6 +267,18 @@ def test_a_file_rule_decides_by_name(
     packed = chosen(linear_clip, ocio_config=str(archive))
     assert packed is not None
     assert packed.input_space == "ACEScg"
+
+
+def test_a_file_that_says_otherwise_than_the_rule_is_told(tmp_path: Path) -> None:
+    for name, said in (("plain", ""), ("ap1", "lin_ap1_scene"), ("ap0", "lin_ap0_scene")):
+        pixels = np.full((4, 4, 3), 0.2, np.float32)
+        metadata = [("oiio:ColorSpace", "string", said)] if said else []
+        write_frame(tmp_path / f"{name}.1.exr", pixels, "half", metadata=metadata)
+        spaces = chosen(str(tmp_path / f"{name}.#.exr"), ocio_config="ocio://studio-config-latest")
+        assert spaces is not None
+        assert spaces.input_space == "ACES2065-1"  # its rule for all EXRs
+        assert ("'ACEScg'" in spaces.note) == (name == "ap1")
+        assert bool(spaces.note) == (name == "ap1")
 
 
 # ---------------------------------------------------------------------------- from clip to sidecar

@@ -14,6 +14,7 @@ from edits import clip, external, movie, save, timeline
 from palette4d.cli import main
 from palette4d.common.errors import Palette4dError
 from palette4d.grade.document import Document
+from palette4d.shows import timeline_clips
 from palette4d.shows.analysis import analyze_shots
 from palette4d.shows.exports import export
 
@@ -109,3 +110,33 @@ def test_what_is_refused_before_anything_is_baked(show: Path, tmp_path: Path) ->
     with pytest.raises(Palette4dError, match=r"edl=… expects those of an EDL"):
         export(other, tmp_path / "cdls", every=1, format="ccc", edl=tmp_path / "x.edl")
     assert not (tmp_path / "cdls").exists()
+
+
+@pytest.mark.parametrize("kind", ["edl", "otio"])
+def test_an_edit_that_changes_meanwhile(show: Path, tmp_path: Path, kind: str) -> None:
+    def cut(*_: int) -> None:
+        text = EDL.replace("one.mov", "1.mov").replace("two.mov", "one.mov")
+        (tmp_path / "cut.edl").write_bytes(text.replace("1.mov", "two.mov").encode("latin-1"))
+
+    target = tmp_path / f"o.{kind}"
+    with pytest.raises(Palette4dError, match="was changed since its shots were analysed"):
+        export(
+            show, tmp_path / "cdls", every=2, format="ccc", jobs=1, progress=cut, **{kind: target}
+        )
+    assert not target.exists()
+
+
+def test_an_edit_that_changes_while_it_is_read(
+    show: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read = timeline_clips.read
+
+    def slow(path: Path, *rest: object) -> object:
+        found = read(path, *rest)
+        path.write_bytes(path.read_bytes() + b"\n")
+        return found
+
+    monkeypatch.setattr(timeline_clips, "read", slow)
+    with pytest.raises(Palette4dError, match="was changed while it was read"):
+        analyze_shots(tmp_path / "cut.edl", tmp_path / "t", rate=Fraction(24), **QUICK)
+    assert not (tmp_path / "t").exists()

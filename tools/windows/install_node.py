@@ -5,12 +5,15 @@ import ctypes
 import sys
 
 from palette4d.cli.main import main
+from palette4d.hosts.bundle import system_destination
 
 assert sys.platform == "win32"
 _SHOWN, _LAST_ERROR = 1, 32  # of ShellExecuteW
 
 if ctypes.windll.shell32.IsUserAnAdmin():
-    status = main(["install-plugin", *sys.argv[1:]])
+    # Not into a folder of this user's OFX_PLUGIN_PATH.
+    everyone = ["--dest", str(system_destination())]
+    status = main(["install-plugin", *(sys.argv[1:] or everyone)])
     with contextlib.suppress(EOFError):
         input("Enter closes this window. ")
     sys.exit(status)

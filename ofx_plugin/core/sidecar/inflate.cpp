@@ -218,7 +218,7 @@ std::optional<std::string> from_base64(const std::string& text) {
 
 std::optional<std::vector<std::uint8_t>> inflated(const std::string& stream, std::size_t size) {
     const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(stream[i]); };
-    if (stream.size() < 6 || (byte(0) & 15) != 8 || (byte(1) & 0x20) != 0 ||
+    if (stream.size() < 6 || (byte(0) & 15) != 8 || byte(0) >> 4 > 7 || (byte(1) & 0x20) != 0 ||
         (256u * byte(0) + byte(1)) % 31 != 0) {
         return std::nullopt;
     }

@@ -47,7 +47,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     base = "the config to add to a copy of: a file, .ocioz or ocio:// name (default: ACES studio)"
     add("--base", metavar="CONFIG", help=base)
     add("--names", metavar="A,B", help="the shots' names, one a sidecar (default: the clips')")
-    space = "the config's colour space of the clips (default: by the sidecar's encoding)"
+    space = "the config's colour space of clips whose encoding it does not know"
     add("--process-space", metavar="SPACE", help=space)
     add_frame_choice(parser, required=False)
     anyway = "allow a deltaE 2000 above 2 at the frames between"

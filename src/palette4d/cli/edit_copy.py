@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
 
     path = Path(args.sidecar)
     if not manifest.is_manifest(path):
-        print(_copied(path, args))
+        print(_copied(path, args)[0])
         return 0
     found, _ = manifest.sidecars(path)
     source = os.path.realpath(args.source)
@@ -91,18 +91,21 @@ def run(args: argparse.Namespace) -> int:
             f"{path}: found no shot for {args.shots!r} beside the source; expected names such as "
             f"{', '.join(each.name.removesuffix('.p4d.json') for each in found[:4])}"
         )
-    failed = 0
+    failed = done = 0
     for shot in shots:
         try:
-            print(_copied(shot, args))
+            text, copied = _copied(shot, args)
+            print(text)
+            done += copied
         except Palette4dError as error:
             failed += 1
             tell(args, "error", error.message)
-    print(f"copied the grade to {counted(len(shots) - failed, 'shot')} of {len(shots)}")
+    print(f"copied the grade to {counted(done, 'shot')} of {len(shots)}")
     return 1 if failed else 0
 
 
-def _copied(path: Path, args: argparse.Namespace) -> str:
+def _copied(path: Path, args: argparse.Namespace) -> tuple[str, bool]:
+    """Return what to tell, and whether anything was copied."""
     document = load(path)
     versions = document.grade.versions
     fit = document.copy_from(load(args.source), time=args.time)
@@ -112,4 +115,4 @@ def _copied(path: Path, args: argparse.Namespace) -> str:
         for v in document.grade.versions
         if v not in versions
     ]
-    return f"{path.name}: {fit}{''.join(kept)}"
+    return f"{path.name}: {fit}{''.join(kept)}", not fit.nothing

@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
     ):
         print(f"installed {path}")
     if args.dest or not (args.kdenlive or args.shotcut):
-        if args.dest:
+        if args.dest and args.dest != system_destination():  # there hosts look by themselves
             say = "setx OFX_PLUGIN_PATH " if sys.platform == "win32" else "export OFX_PLUGIN_PATH="
             print(f"Tell your host where it is: {say}{quoted(args.dest.absolute())}")
         print(

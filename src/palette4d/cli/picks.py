@@ -491,6 +491,7 @@ def _told(document: Document, pick: Pick, followed: bool = False, boxed: bool = 
     `followed` and `boxed`: whether the path and the window were to be followed just now.
     """
     from palette4d.grade.colour_moves import fades_text
+    from palette4d.grade.rendering import unread_picks
 
     asked = shown(pick.rgb) + (f" -> {shown(pick.to)}" if pick.to is not None else " stays")
     lines = [f"{pick.id}: {pick.kind} at frame {pick.frame:g}: {asked}"]
@@ -512,6 +513,8 @@ def _told(document: Document, pick: Pick, followed: bool = False, boxed: bool = 
                 "lost among others, or hardly there. Where you still see it: pick --frame T "
                 f"--pixel X,Y --with {pick.id}"
             )
+    elif pick.id in unread_picks(document):
+        lines.append("  is not followed through the clip yet: open the sidecar in Studio")
     else:
         source = document.grade.core.clip["source"]
         why = f": the clip {source!r} was not found; give it with --clip" if followed else ""
@@ -580,12 +583,12 @@ def _path(pick: Pick) -> list[str]:
     limits = [f"--from {begin:g}"] * (begin > first) + [f"--until {end:g}"] * (end < last)
     given = any(key.given and key.frame == far for key in pick.path)
     if pick.kind == "pick" and limits and not given:
+        same = f"change {pick.id} --toward colour gives it the same new colour. "
+        same = f"If the thing itself changes: {same}" if pick.toward == "shift" else ""
         lines.append(
             f"  note: at frame {far:g} it is {away.max():.2f} away from the picked colour. If that "
             f"is another thing: pick --frame {far:g} --pixel X,Y --with {pick.id}, or change "
-            f"{pick.id} {' '.join(limits)}. If the thing itself changes: change {pick.id} "
-            "--toward colour gives it the same new colour. If it stays: change "
-            f"{pick.id} --no-follow"
+            f"{pick.id} {' '.join(limits)}. {same}If it stays: change {pick.id} --no-follow"
         )
     return lines
 

@@ -34,11 +34,16 @@ class Viewing:
     encoding: str = ""
 
     def lab(self, colours: ArrayLike) -> F64:
-        """Return the (n, 3) CIE L*a*b* (D65) of (n, 3) code values."""
+        """Return the (n, 3) CIE L*a*b* (D65) of (n, 3) code values.
+
+        What a display shows: where the encoding is one of displays, values are clamped to 0..1.
+        """
         from skimage.color import rgb2lab
 
-        srgb = colours if self.to_srgb is None else self.to_srgb(colours)
-        return np.asarray(rgb2lab(np.asarray(srgb, dtype=np.float64)))
+        srgb = np.asarray(colours if self.to_srgb is None else self.to_srgb(colours), np.float64)
+        if self.encoding in ("", "sdr-video"):
+            srgb = srgb.clip(0, 1)
+        return np.asarray(rgb2lab(srgb))
 
 
 def viewing_of(encoding: str) -> Viewing:

@@ -5,6 +5,7 @@ import contextlib
 import difflib
 import functools
 import os
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,9 @@ _LUTS = frozenset(
         *("look", "lut", "m3d", "mga", "ocio", "spi1d", "spi3d", "spimtx", "vf"),
     }
 )
+
+#: Names of scene-linear colour spaces: "Linear", "lin_rec709", "ACEScg", "ACES2065-1", ...
+_LINEAR = re.compile(r"\blin(ear)?(\b|_)|scene.linear|acescg|aces2065", re.IGNORECASE)
 
 #: The names of one encoding in files and in OpenColorIO configs of different years.
 SAME_ENCODINGS = (
@@ -226,6 +230,15 @@ def same_encodings(encoding: str) -> list[str]:
         if encoding.strip().lower() in (name.lower() for name in names):
             return [encoding, *names]
     return [encoding]
+
+
+def says_linear(encoding: str) -> bool:
+    """Return whether an encoding's name is that of scene-linear light.
+
+    >>> says_linear("ACEScg"), says_linear("lin_rec709_scene"), says_linear("ACEScct")
+    (True, True, False)
+    """
+    return _LINEAR.search(encoding) is not None
 
 
 def space_of_encoding(config: Any, encoding: str) -> Any | None:

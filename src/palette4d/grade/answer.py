@@ -33,8 +33,9 @@ WIDTH = 480
 #: Least share of the change of a pixel that counts as taken. A marked pixel with less than LEAST is
 #: reported: pale parts of a thing change a little.
 TAKEN, LEAST = 0.25, 0.05
-#: Least share of the frame of other things to report. Smaller areas are seldom seen.
-OTHERS = 0.005
+#: Least share of the frame of other things to report, and of what the pick takes: beside a small
+#: thing smaller areas are seen. None is reported below a tenth of the first.
+OTHERS, OF_TAKEN = 0.005, 0.1
 #: Largest share of the change of a thing, and of what was marked, that a hold may cost unreported.
 COST = 0.1
 #: A pick that takes more than this share of the pixels of another pick is reported.
@@ -409,9 +410,9 @@ def _also(it: _Thing) -> Iterator[Note]:
     ]
     if not beside.any():
         yield from _flood(it, change)
-    unparted = False
+    unparted, least = False, _least(change)
     for words, others in sorted(kinds, key=lambda kind: -change[kind[1]].sum()):
-        if (share := float(change[others].sum() / change.size)) <= OTHERS:
+        if (share := float(change[others].sum() / change.size)) <= least:
             break
         touches = others is beside
         warns = touches and flood
@@ -436,6 +437,11 @@ def _also(it: _Thing) -> Iterator[Note]:
         yield from _apart(it, change)
 
 
+def _least(change: F32) -> float:
+    """Return the least share of the frame of other things to report."""
+    return min(OTHERS, max(OTHERS / 10, OF_TAKEN * float(change.mean())))
+
+
 def _flood(it: _Thing, change: F32) -> Iterator[Note]:
     """Report a thing that fills the frame with colours unlike the marked ones."""
     own, view = it.own, it.view
@@ -457,7 +463,11 @@ def _apart(it: _Thing, change: F32) -> Iterator[Note]:
     box = it.view.around(thing_itself)
     after = it.view.within(it.pick, box)
     rest = _lost(change, after, ~thing_itself)
-    if rest > 0.5 and (change - after).mean() > OTHERS and _lost(change, after, it.own) <= COST:
+    if (
+        rest > 0.5
+        and (change - after).mean() > _least(change)
+        and _lost(change, after, it.own) <= COST
+    ):
         words = "if that is not part of it, a window around the thing leaves it out"
         note = Note(words, id=it.pick.id, window=box)
         yield note.proposing("window", after)

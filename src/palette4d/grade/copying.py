@@ -61,6 +61,8 @@ class Fit:
         The picks whose colour is not in the target's clip, with what they are, for people.
     everywhere : tuple of str
         The ids of copied picks that have a window in the source: windows are not copied.
+    nothing : bool
+        All of the grade are such picks: nothing is copied.
     """
 
     change: float
@@ -69,6 +71,7 @@ class Fit:
     foreign: float
     left_out: tuple[str, ...] = ()
     everywhere: tuple[str, ...] = ()
+    nothing: bool = False
 
     @property
     def fits(self) -> bool:
@@ -83,6 +86,8 @@ class Fit:
             f"the copy differs from the copied grade by {self.mean * 255:.1f} of 255 on average, "
             f"by {self.largest * 255:.1f} at most (99 % of the colours); the grade changes the "
             f"colours by {self.change * 255:.1f}"
+            if self.change
+            else "the grade moves no colours of the palette but by its picks"
         )
         if self.foreign >= 0.005:
             text += (
@@ -91,6 +96,7 @@ class Fit:
         if self.left_out:
             why = "nothing connected has the colour here"
             text += f"; not copied, since {why}: {', '.join(self.left_out)}"
+            text += "; the edits stay" * self.nothing
         if self.everywhere:
             why = "that is a place in the other clip"
             text += f"; without a window, since {why}: {', '.join(self.everywhere)}"
@@ -166,7 +172,12 @@ def copied(
     ]
     label = f"copy the grade of {source.members['clip']['name']}"
     measured = fit(after, source, time)
-    whole = replace(measured, left_out=tuple(left_out), everywhere=tuple(everywhere))
+    whole = replace(
+        measured,
+        left_out=tuple(left_out),
+        everywhere=tuple(everywhere),
+        nothing=bool(left_out) and not after.edited,
+    )
     return after.labelled(label), whole
 
 

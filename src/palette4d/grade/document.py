@@ -501,7 +501,7 @@ class Document:
 
         Each handle gets the colour that the other grade makes of its colour at the corresponding
         time. Picks are learned again there. Active edits that no version holds are kept as the
-        version "before copy".
+        version "before copy". If nothing of the grade is in this clip, the edits stay.
 
         Parameters
         ----------
@@ -524,7 +524,8 @@ class Document:
             The source has no edits, the frame is outside of its clip, or its colour space cannot be
             converted.
         """
-        return self._made(copying.copied(self.grade, source.grade, self._clip(clip), time))
+        after, fit = copying.copied(self.grade, source.grade, self._clip(clip), time)
+        return fit if fit.nothing else self._made((after, fit))
 
     # ----------------------------------------------------------------------------------- pictures
 

@@ -5,7 +5,6 @@ grade and arguments that return a grade. `Document` adds the steps and the file.
 """
 
 import math
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -14,6 +13,7 @@ from types import MappingProxyType
 from typing import Any, Self
 
 from palette4d import _core
+from palette4d.colour.ocio_config import says_linear
 from palette4d.common.errors import Arg, Palette4dError
 from palette4d.grade import members
 from palette4d.grade.edits import (
@@ -37,9 +37,6 @@ from palette4d.grade.members import Fields
 from palette4d.grade.palette import Near, Palette, palette_at
 from palette4d.grade.picks import Pick
 from palette4d.grade.tracks import Track, tracks_of
-
-#: Names of scene-linear colour spaces: "Linear", "lin_rec709", "ACEScg", "ACES2065-1", ...
-_LINEAR = re.compile(r"\blin(ear)?(\b|_)|scene.linear|acescg|aces2065", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +159,7 @@ class Grade:
         clip = self.members["clip"]
         names = (clip["encoding"], clip.get("conversion", {}).get("input_space", ""))
         brightest = max(max(v["rgb"]) for v in self.handles.vertices.values())
-        return any(_LINEAR.search(name) for name in names) or brightest > 2
+        return any(map(says_linear, names)) or brightest > 2
 
     @cached_property
     def settings(self) -> Settings:

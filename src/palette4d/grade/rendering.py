@@ -14,6 +14,8 @@ import numpy as np
 
 from palette4d.common.files import make_folder
 from palette4d.common.message import Arg
+from palette4d.common.text import some_of
+from palette4d.grade import later
 from palette4d.grade.document import Document
 from palette4d.grade.movie_rendering import MoviePlan, rate_of
 from palette4d.grade.output import Output
@@ -115,7 +117,19 @@ def mismatches(document: Document, clip: Clip, whole: bool) -> list[str]:
             f"{spans}, this clip has {describe(clip.frames)}; each frame takes the palette of its "
             "own number. Check that this is the clip you mean"
         )
+    if waiting := unread_picks(document):
+        notes.append(
+            f"{some_of(waiting)} not yet followed through the clip, as a program ended too early: "
+            "open the sidecar in Studio, which goes on"
+        )
     return notes
+
+
+def unread_picks(document: Document) -> list[str]:
+    """Return the ids of enabled picks whose steps have not read the clip yet."""
+    steps = [step for _, _, step in later.unread(document.grade, document.history)]
+    ids = {change.id for step in steps for change in step.changes if change.kind == "pick"}
+    return [pick.id for pick in document.grade.picks if pick.enabled and pick.id in ids]
 
 
 @dataclass
@@ -280,6 +294,7 @@ def render(
     **picture
         What to draw: ``strength``, ``show`` and so on, as for `Document.recolour`.
     """
+    dated = existing.Dated(document.path if isinstance(document, Document) else document)
     if not isinstance(document, Document):
         document = Document.load(document)
     drawn = Output(**picture)
@@ -327,7 +342,7 @@ def render(
         make_folder(pattern.folder)
         clip, left_out = with_surroundings(clip, pattern, drawn, compare)
         notes = [*repeated, *frame_notes(clip, pattern.extension), *left_out]
-        opened = contextlib.nullcontext(frame_files(clip, pattern, samples))
+        opened = contextlib.nullcontext(frame_files(clip, pattern, samples, dated))
     warnings = mismatches(document, clip, whole)
     notes = [*clip.notes, *notes]
     if tell is not None:
@@ -360,6 +375,8 @@ def render(
         finish()
         if todo and not rendered:
             raise clip.none_readable()
+    if movie:
+        dated(Path(output))
     return Rendered(
         written[:1] if movie else written,
         rendered,
@@ -446,8 +463,13 @@ def frames_to_render(
 _Write = Callable[[Image, F32], Path]
 
 
-def frame_files(clip: Clip, pattern: FramePattern, samples: str) -> _Write:
-    """Return a function that writes a frame to its file, with the source frame's metadata."""
+def frame_files(
+    clip: Clip, pattern: FramePattern, samples: str, dated: Callable[[Path], None]
+) -> _Write:
+    """Return a function that writes a frame to its file, with the source frame's metadata.
+
+    `dated` is called after each file.
+    """
 
     def write(image: Image, pixels: F32) -> Path:
         metadata = image.metadata
@@ -461,9 +483,10 @@ def frame_files(clip: Clip, pattern: FramePattern, samples: str) -> _Write:
             held = image.around.file != clip.file(image.frame)
             own = timecode_in(metadata) if held else None
             write_around(path, image.around, pixels, samples, own)
-            return path
-        premultiplied = clip.premultiplied
-        write_frame(path, pixels, samples, premultiplied=premultiplied, metadata=metadata)
+        else:
+            premultiplied = clip.premultiplied
+            write_frame(path, pixels, samples, premultiplied=premultiplied, metadata=metadata)
+        dated(path)
         return path
 
     return write

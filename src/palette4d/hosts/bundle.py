@@ -99,17 +99,17 @@ def install_bundle(
                 f"{target}: found something that is not an OpenFX bundle of Palette4D, "
                 f"expected nothing or an earlier version; replace it with {Arg('force', True)}"
             )
-        # Beside the target, so that the rename stays on one file system.
+        # Beside the target, so that the rename stays on one file system. Not by the name of a
+        # bundle: hosts look for that in hidden folders too, and would load half a library.
         with temporary_folder(destination) as temporary:
-            fresh = temporary / BUNDLE
+            fresh = temporary / "new"
             if link:
                 fresh.symlink_to(bundle, target_is_directory=True)
                 # Another's installation may be closed: then the node says what its buttons need.
                 with contextlib.suppress(WriteError):
                     _write_program(bundle)
             else:
-                # Bytes alone: modes are set below, and Wine lacks Windows' own copying.
-                shutil.copytree(bundle, fresh, copy_function=shutil.copyfile)
+                shutil.copytree(bundle, fresh, copy_function=_copy)
                 _write_program(fresh)
                 _open_for_all(fresh)
             _replace(fresh, target, temporary / "old")
@@ -136,6 +136,13 @@ def install_bundle(
     return target
 
 
+def _copy(source: str, target: str) -> None:
+    """Copy a file's bytes to the disk: modes are set later, and Wine lacks Windows' own copying."""
+    shutil.copyfile(source, target)
+    with Path(target).open("rb+") as file:
+        os.fsync(file.fileno())
+
+
 def _reason(error: OSError) -> str:
     # One error of `copytree` holds those of all files: (from, to, text).
     if isinstance(error, shutil.Error) and error.args[0]:
@@ -143,18 +150,37 @@ def _reason(error: OSError) -> str:
     return error.strerror or str(error)
 
 
+#: Prints Python's folders of modules, also those that files *.pth name and that are not there yet.
+_MODULE_FOLDERS = """
+import glob, os, sys
+print(*sys.path, sep="\\n")
+for file in [file for folder in sys.path for file in glob.glob(glob.escape(folder) + "/*.pth")]:
+    with open(file, encoding="utf-8", errors="surrogateescape") as lines:
+        for line in map(str.strip, lines):
+            if line and not line.startswith(("#", "import ", "import\\t")):
+                print(os.path.join(os.path.dirname(file), line))
+"""
+
+
+def _there(path: Path) -> Path:
+    """Return a path, or the folder where what is missing of it would be made."""
+    while not path.exists():
+        path = path.parent
+    return path
+
+
 def _refuse_others_program(bundle: Path) -> None:
     """Check that root alone may change what all users' nodes will run."""
     # This file: an editable installation runs its sources, which lie elsewhere. The folders of
     # modules: a virtual environment has those of its base, and others by files *.pth.
-    ask = [sys.executable, "-E", "-P", "-c", "import sys; print(*sys.path, sep='\\n')"]
+    ask = [sys.executable, "-E", "-P", "-c", _MODULE_FOLDERS]
     folders = subprocess.run(ask, check=True, stdout=subprocess.PIPE, encoding="utf-8").stdout
     above = (sys.executable, sys.prefix, sys.base_prefix, f"{sys.prefix}/pyvenv.cfg")
     within = (*folders.splitlines(), str(Path(__file__).parents[1]), str(bundle))
     for text in (*above, *within):
         path = Path(text)
         check = changeable_within if text in within else changeable
-        problem = check(path) if path.exists() else None
+        problem = (check if path.exists() else changeable)(_there(path))
         if problem is not None:
             raise Palette4dError(
                 f"{path}: {problem}. Every user's node would run what that one puts there. Install "
@@ -166,6 +192,8 @@ def _refuse_others_program(bundle: Path) -> None:
 def _make_open_folder(folder: Path) -> None:
     """Make a folder and its parents; root's are readable for all whatever the umask is."""
     if not folder.exists():
+        if folder.parent == folder:
+            raise FileNotFoundError(errno.ENOENT, "there is no such drive", str(folder))
         _make_open_folder(folder.parent)
         folder.mkdir(exist_ok=True)
         if runs_as_root():

@@ -54,13 +54,17 @@ class SpaceOptions:
 
 @dataclasses.dataclass(frozen=True)
 class Spaces:
-    """The colour spaces of a clip and its palette; `conversion` is None if they are the same."""
+    """The colour spaces of a clip and its palette; `conversion` is None if they are the same.
+
+    `note` tells the user where the clip's files state another input space.
+    """
 
     config: Any
     config_name: str
     input_space: str
     palette_space: str
     conversion: Conversion | None
+    note: str = ""
 
 
 def spaces_of(clip: Clip, options: SpaceOptions) -> Spaces | None:
@@ -91,7 +95,15 @@ def spaces_of(clip: Clip, options: SpaceOptions) -> Spaces | None:
     target = _palette_space(options, config, config_name, source)
     names = str(source.getName()), str(target.getName())
     chain = None if names[0] == names[1] else conversion(config, *names)
-    return Spaces(config, config_name, *names, chain if chain and chain.steps else None)
+    chain, note = chain if chain and chain.steps else None, ""
+    stated = _stated_space(clip, config)
+    if options.input_space is None and stated is not None and stated.getName() != names[0]:
+        note = (
+            f"the clip's files state {stated.getName()!r}, but a rule of {config_name} for their "
+            f"names says {names[0]!r}, which is taken; if the files are right, give "
+            f"{Arg('input_space', stated.getName())}"
+        )
+    return Spaces(config, config_name, *names, chain, note)
 
 
 def _input_space(clip: Clip, options: SpaceOptions, config: Any, config_name: str) -> Any:
@@ -102,14 +114,18 @@ def _input_space(clip: Clip, options: SpaceOptions, config: Any, config_name: st
     if not config.filepathOnlyMatchesDefaultRule(path):
         name, _ = config.getColorSpaceFromFilepath(path)
         return colour_space(config, config_name, name, f"a file rule for {path}: {name!r}")
-    for name in same_encodings(clip.encoding):
-        space = config.getColorSpace(name)
-        if space is not None and not space.isData():
-            return space
+    if (stated := _stated_space(clip, config)) is not None:
+        return stated
     if clip.depth not in FLOATS:
         return None
     name, _ = config.getColorSpaceFromFilepath(path)
     return colour_space(config, config_name, name, f"the default file rule: {name!r}")
+
+
+def _stated_space(clip: Clip, config: Any) -> Any:
+    """Return the colour space that the clip's files state, if the config knows it."""
+    spaces = (config.getColorSpace(name) for name in same_encodings(clip.encoding))
+    return next((space for space in spaces if space is not None and not space.isData()), None)
 
 
 def _palette_space(options: SpaceOptions, config: Any, config_name: str, source: Any) -> Any:

@@ -2,20 +2,51 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
 from palette4d.common.errors import Palette4dError
+from palette4d.common.files import date
 from palette4d.media import oiio_text
 from palette4d.media.clip import open_clip
 from palette4d.media.exr_around import has_every_block
 
 
 def is_older(path: Path, sidecar: Path | None) -> bool:
-    """Whether a file was written before the sidecar was saved."""
+    """Whether a file was written before the sidecar was saved, or put there.
+
+    A copy or another name may bring an earlier time of saving with it.
+    """
     if sidecar is None or not sidecar.is_file():
         return False
-    return path.stat().st_mtime < sidecar.stat().st_mtime
+    about = sidecar.stat()
+    return path.stat().st_mtime < max(about.st_mtime, about.st_ctime)
+
+
+class Dated:
+    """Gives files the time of the sidecar that they are of, once that was saved meanwhile.
+
+    So they are older than the sidecar that is there. Make one before the sidecar is read.
+    """
+
+    def __init__(self, sidecar: str | os.PathLike[str] | None) -> None:
+        self._sidecar = sidecar
+        self._before = self._times()
+
+    def __call__(self, path: Path) -> None:
+        """Look after a file that was just written."""
+        if self._before is not None and self._before != self._times():
+            date(path, self._before[0])
+
+    def _times(self) -> tuple[int, int] | None:
+        if self._sidecar is None:
+            return None
+        try:
+            about = Path(self._sidecar).stat()
+        except OSError:
+            return 0, 0
+        return about.st_mtime_ns, about.st_ctime_ns
 
 
 def is_whole_frame(path: Path, size: tuple[int, int]) -> bool:

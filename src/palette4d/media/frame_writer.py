@@ -8,7 +8,9 @@ picture is laid over black.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+import sys
+from collections.abc import Generator, Iterable, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -35,6 +37,9 @@ _METADATA: dict[str, tuple[str, ...]] = {
 }
 _OWN = {"exr": (), "dpx": ("dpx:",), "tif": ("Exif:", "IPTC:", "GPS:")}
 _COMMON = ("oiio:ColorSpace", "smpte:TimeCode", "smpte:KeyCode")
+#: Characters of a text in a JPEG: all of its Exif data share 64 kB, and libjpeg ends the program
+#: where they are more.
+_JPEG_TEXT = 2000
 _HALF_MAX = float(np.finfo(np.float16).max)
 
 
@@ -265,7 +270,8 @@ def write_frame(
     kind = "uint16" if samples == "uint10" else samples
     spec = oiio.ImageSpec(width, height, channels, kind)
     for name, kind, value in metadata:
-        if _holds(extension, name):
+        long = extension == "jpg" and isinstance(value, str) and len(value) > _JPEG_TEXT
+        if _holds(extension, name) and not long:
             spec.attribute(name, kind, value)
     spec.attribute("compression", "jpeg:95" if extension == "jpg" else "zip")
     if samples == "uint10":
@@ -280,20 +286,35 @@ def write_frame(
         spec.attribute("oiio:UnassociatedAlpha", 0 if premultiplied else 1)
 
     with replacing(path, force=True) as temporary:
-        target = oiio.ImageOutput.create(oiio_text.file_name(temporary))
-        if target is None:
-            raise OutputError(f"{path}: {oiio_text.problem_of(oiio)}; expected {_EXPECTED}")
-        if not target.open(str(temporary), spec):
-            raise cannot_write(path, oiio_text.problem_of(target))
-        written = target.write_image(stored)
-        # PNG reports a full disk here, and still returns true.
-        problem = oiio_text.problem_of(target)
-        closed = target.close()
-        # Likewise; of a whole TIFF it complains about Exif data.
-        closing = oiio_text.problem_of(target)
+        with _place(temporary, extension) as place:
+            target = oiio.ImageOutput.create(oiio_text.file_name(temporary))
+            if target is None:
+                raise OutputError(f"{path}: {oiio_text.problem_of(oiio)}; expected {_EXPECTED}")
+            if not target.open(place, spec):
+                raise cannot_write(path, oiio_text.problem_of(target))
+            written = target.write_image(stored)
+            # PNG reports a full disk here, and still returns true.
+            problem = oiio_text.problem_of(target)
+            closed = target.close()
+            # Likewise; of a whole TIFF it complains about Exif data.
+            closing = oiio_text.problem_of(target)
         problem = problem or (closing if extension != "tif" else "")
         if problem or not written or not closed or not _is_whole(temporary, stored):
             raise cannot_write(path, problem)
+
+
+@contextmanager
+def _place(path: Path, extension: str) -> Generator[str]:
+    """Yield the name that OpenImageIO writes to: of a JPEG a file in memory, where there are such.
+
+    libjpeg ends the program when the disk is full.
+    """
+    if extension != "jpg" or sys.platform != "linux":
+        yield str(path)
+        return
+    with os.fdopen(os.memfd_create("frame"), "rb") as memory:
+        yield f"/proc/self/fd/{memory.fileno()}"
+        path.write_bytes(memory.read())
 
 
 def _holds(extension: str, name: str) -> bool:

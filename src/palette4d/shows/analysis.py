@@ -9,7 +9,7 @@ from pathlib import Path
 
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.colour.ocio_config import from_anywhere
-from palette4d.common.errors import Arg, Message, UnfinishedError
+from palette4d.common.errors import Arg, Message, Palette4dError, UnfinishedError
 from palette4d.common.text import counted, file_safe, some_of
 from palette4d.grade.sidecar import OnEdits
 from palette4d.jobs.workers import Workers
@@ -141,7 +141,10 @@ def _of_timeline(
     conform: Conform | None,
 ) -> tuple[Source, list[Shot], list[str]]:
     """Return a timeline, its shots, and notes."""
+    sha256 = timeline_files.sha256(path) if path.is_file() else ""  # the reader says why not
     timeline = timeline_clips.read(path, rate)
+    if timeline_files.sha256(path) != sha256:
+        raise Palette4dError(f"{path}: it was changed while it was read; run the command again")
     folder = None if media is None else find_media.Folder(Path(media))
     listed, counting = timeline_shots.shots_of(timeline, folder, handles, conform)
     named, renamed = shots.numbered(listed)
@@ -161,5 +164,5 @@ def _of_timeline(
             f"{'was' if len(renamed) == 1 else 'were'} renamed by the first frame: "
             f"{some_of(renamed)}"
         )
-    source = Source(file_safe(path.stem), str(path), timeline_files.sha256(path), timeline.rate)
+    source = Source(file_safe(path.stem), str(path), sha256, timeline.rate)
     return source, named, notes

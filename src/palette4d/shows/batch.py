@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from palette4d.analysis import pipeline
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.colour.ocio_config import files_of_config
 from palette4d.common.errors import Arg, Palette4dError, in_words
-from palette4d.common.files import make_folder
+from palette4d.common.files import make_folder, names_a_server
 from palette4d.common.text import counted, some_of
 from palette4d.grade import reanalysis, sidecar
 from palette4d.jobs.workers import Failed, Workers
@@ -104,18 +104,19 @@ def analyse(
     tell(*show.progress())
     try:
         # A shot may take minutes: Ctrl-C does not wait for it.
-        reads = _files(show.tasks.values(), options.spaces.ocio_config)
+        reads = _files(show.tasks.values())
         options.workers.run(analyse_shot, show.tasks, take, patient=False, reads=reads)
     finally:
         show.save()
     return show
 
 
-def _files(tasks: Iterable[ShotTask], config: str | None) -> list[Path]:
+def _files(tasks: Iterable[ShotTask]) -> list[Path]:
     """Return what the processes that analyse shots must read."""
-    clips = dict.fromkeys(task.clip for task in tasks)
-    files = [path for clip in clips for path in files_of(clip)]
-    return files + files_of_config(config or os.environ.get("OCIO") or "")
+    configs = {task.clip: task.options.spaces.ocio_config for task in tasks}
+    files = [path for clip in configs for path in files_of(clip)]
+    named = dict.fromkeys(config or os.environ.get("OCIO") or "" for config in configs.values())
+    return files + [path for config in named for path in files_of_config(config)]
 
 
 class Show:
@@ -137,11 +138,16 @@ class Show:
         before = manifests.read(self.path) if self.path.exists() else None
         known = {} if before is None else {entry.shot.name: entry for entry in before.entries}
         spaces = dataclasses.asdict(options.spaces) if options.spaces.asked else {}
+        recorded = options.analysis.recorded() | spaces
+        self.own: dict[str, str] = {}  # of the chosen shots
+        if before is not None and options.only:
+            # What is not given is the show's.
+            self.own, recorded = {**_given(before.options), **_given(spaces)}, before.options
         self._head = Manifest(
             source=self.beside(source.file),
             source_sha256=source.sha256,
             rate=source.rate,
-            options=options.analysis.recorded() | spaces,
+            options=recorded,
             entries=(),
         )
         self.same_edit = (
@@ -149,14 +155,22 @@ class Show:
             and self._head.is_timeline
             and (before.source_sha256, before.rate) == (source.sha256, source.rate)
         )
-        self.same_options = before is not None and before.options == self._head.options
+        self.before = {} if before is None else before.options
         self.entries: dict[str, Entry] = {}
         self.tasks: dict[str, ShotTask] = {}
         self.kept: list[str] = []
         self.analysed: list[str] = []
         self.notes: dict[str, tuple[str, ...]] = {}
+        self.graded: list[str] = []  # whose edits would be lost
         for shot in shots:
             self.plan(shot, known.get(shot.name))
+        if self.graded:
+            raise Palette4dError(
+                f"{counted(len(self.graded), 'shot has', 'shots have')} edits that a new analysis "
+                f"would lose: {some_of(self.graded)}; nothing was analysed. Keep them with "
+                f"{Arg('on_edits', 'keep')} (a changed palette gets a copy of the grade), discard "
+                f"them with {Arg('on_edits', 'drop')}, or choose other shots with {Arg('only')}"
+            )
 
     def __repr__(self) -> str:
         """Return one line: the manifest's file, and how many shots have a sidecar."""
@@ -171,7 +185,7 @@ class Show:
     def plan(self, shot: Shot, before: Entry | None) -> None:
         """Decide whether to keep or to analyse a shot."""
         own = dataclasses.replace(shot, clip=self.beside(shot.clip), problem="")
-        entry = Entry(own)
+        entry = Entry(own, spaces=self.spaces_for(before))
         chosen = not self.options.only or shot.name in self.options.only
         if before is not None and not chosen and self.stays(before, own):
             place = dataclasses.replace(before.shot, used=own.used, place=own.place)
@@ -179,18 +193,37 @@ class Show:
             if entry.status == DONE:
                 self.kept.append(shot.name)
         elif shot.problem:
-            entry = Entry(own, FAILED, error=shot.problem)
+            entry = dataclasses.replace(entry, status=FAILED, error=shot.problem)
         elif not self.options.force and (frames := self.there(own, before)) is not None:
-            entry = Entry(own, DONE, frames)
+            entry = dataclasses.replace(entry, status=DONE, frames=frames)
             self.kept.append(shot.name)
             _tell_edit(self.folder / entry.sidecar, own, frames)
         elif chosen:
             try:
+                self.tasks[shot.name] = self.task(shot, entry)
                 self.check_target(entry, before)
-                self.tasks[shot.name] = ShotTask(shot, str(Path.cwd() / shot.clip), self.options)
             except Palette4dError as error:
-                entry = Entry(own, FAILED, error=str(error))
+                if self.tasks.pop(shot.name, None) and before is not None and before.status == DONE:
+                    self.graded.append(shot.name)
+                entry = dataclasses.replace(entry, status=FAILED, error=error.message.marked)
         self.entries[shot.name] = entry
+
+    def spaces_for(self, before: Entry | None) -> Mapping[str, str]:
+        """Return a shot's own colour spaces: `only` gives them, and without it they stay."""
+        own = self.own if self.options.only or before is None else before.spaces
+        return {} if own == _given(self._head.options) else own
+
+    def task(self, shot: Shot, entry: Entry) -> ShotTask:
+        """Return what is to be done for a shot."""
+        own = entry.spaces or _given(self._head.options)
+        config = own.get("ocio_config", "")
+        if config != self.options.spaces.ocio_config and names_a_server(config, self.path):
+            raise Palette4dError(
+                f"{self.path}: found the config {config}, on another server, expected one that you "
+                f"name yourself, with {Arg('ocio_config')}"
+            )
+        options = dataclasses.replace(self.options, spaces=SpaceOptions(**own))
+        return ShotTask(shot, str(Path.cwd() / shot.clip), options)
 
     def stays(self, before: Entry, shot: Shot) -> bool:
         """Whether the manifest's entry still holds for a shot that `only` leaves out."""
@@ -229,7 +262,7 @@ class Show:
         if before and before.frames and dataclasses.replace(before.shot, place=shot.place) == shot:
             expected.add(before.frames)
         same = (
-            (self.same_options if before else not self.options.spaces.asked)
+            (self.same_spaces(before) if before else not self.options.spaces.asked)
             and ends in expected
             and clip["source"] == shot.clip
             and clip["frames"]["step"] == shot.step
@@ -237,6 +270,11 @@ class Show:
             and document["quality"]["options"] == self.options.analysis.recorded()
         )
         return ends if same else None
+
+    def same_spaces(self, before: Entry) -> bool:
+        """Whether a shot has the colour spaces of the analysis before."""
+        wanted = self.spaces_for(before) or _given(self._head.options)
+        return wanted == (before.spaces or _given(self.before))
 
     def beside(self, clip: str) -> str:
         """Return a path relative to the folder, so that both may move together."""
@@ -257,11 +295,13 @@ class Show:
                 document["extra"]["edit"] = played
             target = self.folder / entry.sidecar
             _, notes = reanalysis.save(document, target, on_edits=self.options.on_edits)
-            self.entries[name] = Entry(entry.shot, DONE, (frames["first"], frames["last"]))
+            ends = (frames["first"], frames["last"])
+            self.entries[name] = dataclasses.replace(entry, status=DONE, frames=ends)
             self.analysed.append(name)
             self.notes[name] = (*outcome.notes, *notes)
         except (Palette4dError, OSError) as error:
-            self.entries[name] = Entry(entry.shot, FAILED, error=in_words(error))
+            error_text = in_words(error).marked
+            self.entries[name] = dataclasses.replace(entry, status=FAILED, error=error_text)
         self.save()
 
     def save(self) -> None:
@@ -275,6 +315,12 @@ class Show:
         total = sum(counts[name] for name in [*self.kept, *self.tasks])
         ready = sum(entry.status == DONE for entry in self.entries.values())
         return total - left, total, f"{ready} of {counted(len(self.entries), 'shot')}"
+
+
+def _given(options: Mapping[str, Any]) -> dict[str, str]:
+    """Return the colour spaces that are given, and their config."""
+    named = {name: options.get(name) for name in manifests.SPACES}
+    return {name: value for name, value in named.items() if isinstance(value, str) and value}
 
 
 def _played(shot: Shot, frames: tuple[int, int]) -> dict[str, Any]:

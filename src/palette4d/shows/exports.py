@@ -15,6 +15,7 @@ from palette4d.common.text import counted, some_of
 from palette4d.grade.document import Document
 from palette4d.jobs.workers import Workers
 from palette4d.lut_export import series
+from palette4d.lut_export.bake import SidecarBytes
 from palette4d.lut_export.config import WrittenConfig, write_config
 from palette4d.lut_export.formats import format_named
 from palette4d.lut_export.frame_edit import without_windows
@@ -153,7 +154,8 @@ def export(
             replace(request, sidecar=file, folder=folder / shot, name=shot)
             for file, shot in zip(files, _done(manifest), strict=True)
         ]
-    read = [_core.read_sidecar(str(one.sidecar)) for one in requests]
+    requests = [replace(one, sidecar=SidecarBytes.of(one.sidecar)) for one in requests]
+    read = [SidecarBytes.of(one.sidecar).parsed() for one in requests]
     requests = [replace(one, frames=choose(core)) for one, core in zip(requests, read, strict=True)]
     for one, core in zip(requests, read, strict=True):
         if not format_named(format).is_cdl and (lacks := without_windows(core, one.frames)):

@@ -22,6 +22,7 @@ from palette4d.grade.document import Document
 from palette4d.grade.output import Output
 from palette4d.grade.rendering import Missing, Painter, Rendered
 from palette4d.jobs.workers import Failed, Workers
+from palette4d.media import existing
 from palette4d.media.clip import Clip, open_clip
 from palette4d.media.codecs import is_movie
 from palette4d.media.frame_tags import frame_notes
@@ -96,9 +97,10 @@ def render(
         return rendering.render(document, clip, output, **arguments)
     if isinstance(clip, Clip):
         raise Palette4dError(f"{Arg('cluster')} needs the clip's name, by which workers open it")
+    dated = existing.Dated(document.path if isinstance(document, Document) else document)
     if not isinstance(document, Document):
         document = Document.load(document)
-    return _on_farm(document, os.fspath(clip), Path(output), cluster, **arguments)
+    return _on_farm(document, os.fspath(clip), Path(output), cluster, dated, **arguments)
 
 
 def _on_farm(
@@ -106,6 +108,7 @@ def _on_farm(
     spec: str,
     output: Path,
     cluster: str,
+    dated: existing.Dated,
     *,
     frames: str | None = None,
     compare: rendering.Compare | None = None,
@@ -169,6 +172,7 @@ def _on_farm(
             path = pattern.path(frame)
             with replacing(path, force=True) as temporary:
                 temporary.write_bytes(content)
+            dated(path)
             done.frames.append(frame)
             done.files.append(path)
         done.skipped.extend(answer.skipped)
@@ -201,7 +205,7 @@ def render_frames(task: FramesTask, threads: int) -> Files:
     content = {}
     with tempfile.TemporaryDirectory(prefix="palette4d-") as folder:
         pattern = FramePattern(Path(folder), "", task.pattern.suffix, 1)
-        write = rendering.frame_files(clip, pattern, task.samples)
+        write = rendering.frame_files(clip, pattern, task.samples, existing.Dated(None))
         for frame in task.frames:
             if (painted := painter.paint(frame)) is not None:
                 path = write(*painted)

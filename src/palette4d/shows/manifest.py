@@ -9,12 +9,13 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 from palette4d import _core
-from palette4d.common.errors import Palette4dError, in_words
+from palette4d.common.errors import Message, Palette4dError, in_words
 from palette4d.common.files import replacing
 from palette4d.common.json_files import UnusableFile, read_json
 from palette4d.common.text import some_of
@@ -31,6 +32,8 @@ LARGEST_NUMBER = 2**31 - 1
 _LONGEST_NAME = 200
 
 DONE, FAILED, TO_DO = "done", "failed", "to do"
+#: The options that a shot may have of its own.
+SPACES = ("input_space", "palette_space", "ocio_config")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,12 +47,14 @@ class Entry:
     frames : (int, int) or None; the first and last frame of the sidecar. At cuts of the media there
         are fewer head or tail frames.
     error : the reason of a failure.
+    spaces : the shot's own `SPACES`, by name; it has the show's where this is empty.
     """
 
     shot: Shot
     status: str = TO_DO
     frames: tuple[int, int] | None = None
     error: str = ""
+    spaces: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     @property
     def sidecar(self) -> str:
@@ -128,8 +133,8 @@ def _row(entry: Entry) -> dict[str, Any]:
     if shot.cdl is not None:
         row["cdl"] = dataclasses.asdict(shot.cdl)
     if entry.error:
-        row["error"] = entry.error
-    return row
+        row["error"] = Message(entry.error)
+    return {**row, **entry.spaces}
 
 
 def read(path: Path) -> Manifest:
@@ -201,6 +206,7 @@ def _entry(row: dict[str, Any]) -> Entry:
         status=row["status"],
         frames=(_whole(frames[0]), _whole(frames[1])) if frames else None,
         error=_text(row.get("error", "")),
+        spaces={name: _text(row[name]) for name in SPACES if name in row},
     )
 
 

@@ -15,7 +15,7 @@ from palette4d.common.json_files import read_regular
 from palette4d.common.text import counted, some_of
 from palette4d.lut_export import cdl as cdls
 from palette4d.lut_export.series import Series
-from palette4d.shows import edl_cdl, edl_text, edl_timeline, timeline_files
+from palette4d.shows import edl_cdl, edl_text, edl_timeline, timeline_files, timeline_references
 from palette4d.shows.edl_cdl import Cdl
 from palette4d.shows.manifest import DONE, Manifest
 
@@ -65,6 +65,7 @@ def write_edl(
     """Write a copy of an EDL with the shots' CDLs as comments; return notes for the user."""
     places = timeline_files.in_child(source, places_of, source, manifest.rate)
     data = read_regular(source, timeline_files.LARGEST_FILE)
+    timeline_references.check_unchanged(source, manifest)
     text = edl_text.decoded(data)
     events = edl_text.events_of(text, manifest.rate)
     lines = text.splitlines()

@@ -49,12 +49,17 @@ def source_of(manifest: Manifest, manifest_path: Path, argument: str) -> Path:
         raise Palette4dError(
             f"{source}: the timeline of {manifest_path} is not there; bring it back"
         )
+    check_unchanged(source, manifest)
+    return source
+
+
+def check_unchanged(source: Path, manifest: Manifest) -> None:
+    """Refuse a timeline that was changed since; call it again after it was read for an output."""
     if timeline_files.sha256(source) != manifest.source_sha256:
         raise Palette4dError(
             f"{source}: the timeline was changed since its shots were analysed; run `palette4d "
             "analyze` again, which does the shots that changed"
         )
-    return source
 
 
 def write(
@@ -72,6 +77,7 @@ def write(
     relative to the folder of `target`.
     """
     document = _document(source, manifest.rate)
+    check_unchanged(source, manifest)
     timeline = _timeline(document, source)
     folder = target.absolute().parent
     count = 0

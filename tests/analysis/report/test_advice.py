@@ -45,12 +45,13 @@ TROUBLES = {
 }
 
 
-def said(changes, method="skew", farthest=None, brightest=1.0, **options):
+def said(changes, method="skew", farthest=None, brightest=1.0, linear="", **options):
     return warnings(
         report(**changes),
         AnalysisOptions(method=method, **options),
         farthest or {},
         brightest=brightest,
+        linear=linear,
     )
 
 
@@ -77,9 +78,10 @@ def test_the_limit_that_binds_is_named():
 
 
 def test_scene_linear_light_needs_its_space_first():
-    (text,) = said({"fits": LOOSE, "closest": (0.01, 3, "v1", "v2")}, brightest=50.0)
-    assert "input_space=…" in text
-    assert "handle_cost" not in text
+    for how in ({"brightest": 50.0}, {"linear": "lin_ap1_scene"}):
+        (text,) = said({"fits": LOOSE, "closest": (0.01, 3, "v1", "v2")}, **how)
+        assert "input_space=…" in text
+        assert "handle_cost" not in text
 
 
 def test_colours_that_simpler_palettes_hold_are_named():

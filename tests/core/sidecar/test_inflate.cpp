@@ -205,6 +205,7 @@ TEST(a_damaged_header_is_refused) {
     CHECK(refused(with(0x78, 0x02), kText.size()));  // no multiple of 31
     CHECK(refused(with(0x79, 0x1a), kText.size()));  // another method
     CHECK(refused(with(0x78, 0x20), kText.size()));  // a dictionary
+    CHECK(refused(with(0x88, 0x1c), kText.size()));  // a window that zlib refuses
     CHECK(refused("", 0) && refused("x", 0));
 }
 
