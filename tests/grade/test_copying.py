@@ -143,8 +143,9 @@ def test_wrong_times_are_refused(time: Any) -> None:
     before = target.fields()
     with pytest.raises(Palette4dError):
         target.copy_from(graded(), time=time)
-    with pytest.raises(Palette4dError):
-        target.copy_from(Document(members("split")))
+    plain = GOLDEN / "v1_split.p4d.json"
+    with pytest.raises(Palette4dError, match=re.escape(f"{plain} has no edits")):
+        target.copy_from(Document.load(plain))
     assert target.fields() == before
 
 
@@ -309,11 +310,12 @@ def test_the_grade_is_copied_beyond_a_stop_and_to_another_encoding(
 def test_picks_are_copied() -> None:
     source = Document(members("split"))
     seen = source.grade.palette(8).rgb.mean(axis=0).tolist()
-    source.pick(frame=8, colour=seen, by=(0.2, 0, 0), follow=False, start=4, until=10, fade=2)
+    when = {"start": 4, "until": 10, "fade": 2, "fade_out": 3}
+    source.pick(frame=8, colour=seen, by=(0.2, 0, 0), follow=False, **when)
     target = Document(stretched(members("split"), 2, 100))
     fit = target.copy_from(source)
     (pick,) = target.grade.picks
-    assert (pick.frame, pick.start, pick.until, pick.fade) == (116, 108, 120, 4)
+    assert (pick.frame, pick.start, pick.until, pick.fades) == (116, 108, 120, (4, 6))
     assert not target.grade.settings
     image = np.array(seen, dtype=np.float32)[None, None]
     changed = target.recolour(image, 116)[0, 0] - image[0, 0]

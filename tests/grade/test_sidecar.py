@@ -168,6 +168,7 @@ def test_new_document_is_complete() -> None:
     sidecar.validate(document)
     assert document["generator"] == f"palette4d {_core.__version__}"
     assert document["quality"] == {"stages": [], "options": {"k": 50}, "versions": {}}
+    assert type(document["quality"]["options"]["k"]) is int
     assert not sidecar.has_edits(document)
 
 
@@ -293,6 +294,13 @@ def test_a_file_that_is_no_sidecar_is_not_replaced_unasked(tmp_path: Path) -> No
     empty = tmp_path / "empty.json"
     empty.touch()
     sidecar.save(golden("split"), empty)
+
+
+@pytest.mark.parametrize(("name", "what"), [("A.PNG", "a picture"), ("a.mov", "a movie")])
+def test_a_picture_in_the_place_of_a_sidecar_is_told(tmp_path: Path, name: str, what: str) -> None:
+    (tmp_path / name).write_bytes(b"\x89PNG")
+    with pytest.raises(SidecarError, match=f"{what}, which is no sidecar"):
+        sidecar.load(tmp_path / name)
 
 
 def test_targets_that_cannot_be_written(tmp_path: Path) -> None:
