@@ -11,11 +11,8 @@ look.
 
 import copy
 import filecmp
-import fnmatch
 import glob
-import os
 import shutil
-import stat
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -49,7 +46,6 @@ from palette4d.common.files import (
     refuse_existing,
     replace_by_link,
     replacing,
-    temporary_folder,
 )
 from palette4d.common.text import checked_name, counted, file_safe
 from palette4d.jobs.workers import Workers
@@ -154,16 +150,14 @@ def write_config(
     requests = []
     for k, (file, name, chosen) in enumerate(zip(stored, shot_names, frames, strict=True)):
         luts = own_folder(own_folder(folder / LUTS) / name)
-        baked_now = {f"{name}.{frame}{format_.extension}" for frame in chosen}
-        for old in _old_links(luts, name, format_):
-            if not path.exists():
-                old.unlink()
-            elif old.name in baked_now:
-                _part(old, _names_of(name, format_))
+        for old in _old_links(luts, name, format_) if not path.exists() else ():
+            old.unlink()
         for link, target in links[k].items():
             if (luts / link).exists() and not _is_copy(luts / link, luts / target):
                 refuse_existing(luts / link, force)
-        requests.append(series.Request(file, luts, chosen, settings, name, 0, clip, force))
+        requests.append(
+            series.Request(file, luts, chosen, settings, name, 0, clip, force, replaces_links=True)
+        )
     baked = series.export(requests, workers, progress)
     _refuse_failed(shot_names, baked)
     shots = []
@@ -274,44 +268,12 @@ def _refuse_far(names: list[str], between: list[BetweenError | None]) -> None:
         )
 
 
-def _names_of(name: str, format_: LutFormat) -> str:
-    """Return the pattern of a shot's files."""
-    return f"{glob.escape(name)}.*{format_.extension}"
-
-
 def _old_links(luts: Path, name: str, format_: LutFormat) -> list[Path]:
     """Return the links of a shot's looks."""
     if not luts.is_dir():
         return []
-    entries = luts.glob(_names_of(name, format_))
+    entries = luts.glob(f"{glob.escape(name)}.*{format_.extension}")
     return [entry for entry in entries if entry.is_symlink()]
-
-
-def _part(link: Path, names: str) -> None:
-    """Make a link a file of its own: the earlier config shows the same until a look replaces it.
-
-    Links to other files than looks beside it, whose names match `names`, are removed.
-    """
-    leads = link.readlink()
-    try:
-        if leads.parts != (leads.name,) or not fnmatch.fnmatchcase(leads.name, names):
-            raise FileNotFoundError
-        names_of_flags = ("O_BINARY", "O_NOFOLLOW", "O_NONBLOCK")  # as far as the system has them
-        flags = os.O_RDONLY | sum(getattr(os, flag, 0) for flag in names_of_flags)
-        with os.fdopen(os.open(link.with_name(leads.name), flags), "rb") as look:
-            about = os.fstat(look.fileno())
-            if not stat.S_ISREG(about.st_mode) or about.st_nlink > 1:
-                raise FileNotFoundError
-            data = look.read()
-    except OSError:
-        link.unlink()
-        return
-    with temporary_folder(link.parent) as temporary:
-        copy = temporary / link.name
-        copy.touch(0o600)
-        copy.write_bytes(data)
-        copy.chmod(stat.S_IMODE(about.st_mode))
-        copy.replace(link)
 
 
 def _links(

@@ -62,6 +62,7 @@ class Request:
     padding : digits of the frame numbers in the names.
     clip : the clip, for shapers and errors; None: the clip that the sidecar names.
     force : replace files that differ.
+    replaces_links : a link in a file's place is replaced; False: the file that it leads to.
     """
 
     sidecar: Path | SidecarBytes
@@ -72,6 +73,7 @@ class Request:
     padding: int = 4
     clip: str | None = None
     force: bool = False
+    replaces_links: bool = False
 
 
 @dataclass(frozen=True)
@@ -303,11 +305,16 @@ class _Export:
         self.header = header_of(sidecar, self.file.name, read.data, settings)
         known = read_index(self.index, self.header, request.force)
         names = {f: file_name(name, f, request.padding, format_.extension) for f in frames}
-        self.kept = [f for f in frames if _matches(request.folder / names[f], known.get(f))]
+        self.kept = [
+            f
+            for f in frames
+            if _matches(request.folder / names[f], known.get(f))
+            and not self.is_own_link(request.folder / names[f])
+        ]
         todo = [f for f in frames if f not in set(self.kept)]
         for frame in todo:
             target = request.folder / names[frame]
-            if target.exists():
+            if target.exists() and not self.is_own_link(target):
                 # A file without an entry may match: a killed export may have left it.
                 check_target(target, request.force or frame not in known, self.file)
         # Absolute: other processes may have another working folder. All bake the grade of now.
@@ -325,6 +332,10 @@ class _Export:
         """The number of frames that are done or failed."""
         return len(self.kept) + len(self.baked) + len(self.failed)
 
+    def is_own_link(self, target: Path) -> bool:
+        """Whether a file's place has a link that is to be replaced."""
+        return self.request.replaces_links and target.is_symlink()
+
     def take(self, frame: int, outcome: tuple[Entry, bytes] | Failed) -> None:
         """Write a baked file, or record its failure."""
         if isinstance(outcome, Failed):
@@ -333,7 +344,10 @@ class _Export:
         entry, data = outcome
         try:
             target = self.request.folder / self.tasks[frame].file
-            _put(target, data, self.file, self.request.force)
+            if self.is_own_link(target):
+                _put_for_link(target, data)
+            else:
+                _put(target, data, self.file, self.request.force)
         except WriteError:
             raise  # all other files would fail, too
         except Palette4dError as error:
@@ -373,6 +387,14 @@ def _put(target: Path, data: bytes, sidecar: Path, force: bool) -> None:
     check_target(target, force, sidecar)
     with replacing(target, force=force) as temporary:
         temporary.write_bytes(data)
+
+
+def _put_for_link(link: Path, data: bytes) -> None:
+    """Replace a link atomically by a file."""
+    with temporary_folder(link.parent) as folder:
+        with replacing(folder / link.name) as temporary:
+            temporary.write_bytes(data)
+        (folder / link.name).replace(link)
 
 
 def _matches(path: Path, entry: Entry | None) -> bool:

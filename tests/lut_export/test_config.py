@@ -277,17 +277,31 @@ def test_the_earlier_config_works_where_a_new_one_fails(shot: Path, tmp_path: Pa
         # Looks that were baked before the end are the new ones already.
         same = [np.array_equal(*pair) for pair in zip(before, after, strict=True)]
         assert sum(same) >= len(frames) - 2
-    # A colleague's link at a look's name leads to no other file.
-    (tmp_path / "private").write_text("mine")
-    (tmp_path / "show/luts/cube/cube.3.clf").unlink(missing_ok=True)
-    (tmp_path / "show/luts/cube/cube.3.clf").symlink_to(tmp_path / "private")
-    with pytest.raises(KeyboardInterrupt):
-        write_config([shot], tmp_path / "show", **options(3, force=True), progress=interrupt)
-    files = (tmp_path / "show/luts/cube").iterdir()
-    assert not any(p.is_file() and p.read_bytes() == b"mine" for p in files)
     write_config([shot], tmp_path / "show", **options(10, force=True))
     names = {p.name: p.is_symlink() for p in (tmp_path / "show/luts/cube").glob("*.clf")}
     assert [names[f"cube.{frame}.clf"] for frame in (0, 1, 9)] == [False, True, True]
+
+
+@links
+def test_looks_take_nothing_from_other_links(shot: Path, tmp_path: Path) -> None:
+    """In a shared folder they may be a colleague's, who chooses content and mode of what they show.
+
+    They are replaced, never written through nor read.
+    """
+    show, private = tmp_path / "show", tmp_path / "private"
+    write_config([shot], show, **options(4))
+    private.write_text("mine")
+    private.chmod(0o4755)
+    for frame in (2, 3, 4):
+        (show / f"luts/cube/cube.{frame}.clf").unlink()
+        (show / f"luts/cube/cube.{frame}.clf").symlink_to(private)
+    made = write_config([shot], show, **options(2, force=True)).shots[0].baked
+    assert (made.kept, made.baked) == ([0, 8], [2, 4, 6, 10])
+    looks = {frame: show / f"luts/cube/cube.{frame}.clf" for frame in range(11)}
+    assert [looks[frame].is_symlink() for frame in (2, 3, 4)] == [False, True, False]
+    assert looks[3].readlink() == Path("cube.2.clf")
+    assert all(path.stat().st_mode & 0o7111 == 0 for path in looks.values())
+    assert private.read_text() == "mine"
 
 
 class TestBase:
