@@ -8,6 +8,7 @@ from typing import Any
 
 from palette4d.lut_export.bake import BakeResult
 from palette4d.lut_export.measured_write import BakeSettings
+from palette4d.lut_export.spaces import INPUT, PALETTE, space_of
 
 from palette4d import _core
 from palette4d.common.errors import Arg, Palette4dError
@@ -31,9 +32,15 @@ _CHANGED = {
 def header_of(
     sidecar: _core.Sidecar, name: str, data: bytes, settings: BakeSettings
 ) -> dict[str, Any]:
-    """Return the index members for all files: the sidecar's file, its bytes, and the settings."""
+    """Return the index members for all files: the sidecar's file, its bytes, and the settings.
+
+    A config may change under its name, so that its conversion counts.
+    """
     clip = sidecar.clip
     options = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(settings).items()}
+    if settings.space not in (INPUT, PALETTE):
+        steps = space_of(data, sidecar, settings.space, settings.ocio_config).steps
+        options["conversion"] = hashlib.sha256(json.dumps(steps).encode()).hexdigest()
     return {
         "schema": SCHEMA,
         "version": VERSION,

@@ -22,6 +22,7 @@ from clip_files import write_image
 from edits import clip, external, movie, picture, save, sequence, timeline
 
 from palette4d.cli import main
+from palette4d.grade.document import Document
 from palette4d.media.clip import open_clip
 from palette4d.shows import batch
 
@@ -322,6 +323,29 @@ class TestAgain:
         assert [status for _, status, _ in shots(out)] == ["done", "failed", "done"]
         assert manifest(out)["shots"][::2] == before[::2]
 
+    @pytest.mark.parametrize("sandbox", [(), ("--sandbox", "off")])
+    def test_kept_picks_learn_from_the_shots_clip(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sandbox: tuple[str, ...]
+    ) -> None:
+        """The show's folder lies below the working folder: the clip's path has other beginnings."""
+        take = movie(tmp_path / "plates" / "take.mov", 12)
+        save(timeline(clip("A", external(str(take)), 2, 6)), tmp_path / "edit.otio")
+        (tmp_path / "work").mkdir()
+        monkeypatch.chdir(tmp_path / "work")
+        words = [sys.executable, "-m", "palette4d", "analyze", "../edit.otio", "-o", "show", *QUICK]
+        words += ["--media", "../plates"]
+        subprocess.run(words, check=True, capture_output=True)
+        path = Path("show/A.p4d.json")
+        document = Document.load(path)
+        document.pick(3, pixel=(5, 5), to=(0.2, 0.9, 0.2), follow=False)
+        document.save()
+        assert document.grade.pick("p1").matte
+        words += ["--set", "palette_size=6", "--force", "--keep-edits", *sandbox]
+        done = subprocess.run(words, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        assert "the grade was copied" in done.stdout + done.stderr
+        assert Document.load(path).grade.pick("p1").matte
+
     def test_shots_that_are_not_named_follow_a_new_edit(self, tmp_path: Path) -> None:
         take = external(str(movie(tmp_path / "take.mov", 30)))
         out = tmp_path / "shots"
@@ -460,6 +484,28 @@ class TestColourSpaces:
             own = manifest(out)["shots"][1].get("input_space")
             space = sidecar(out, "rushes_s002")["clip"].get("conversion", {}).get("input_space")
             assert space == (own or manifest(out)["options"].get("input_space"))
+
+    def test_only_gives_spaces_to_its_shots_alone(self, tmp_path: Path) -> None:
+        take = external(str(movie(tmp_path / "take.mov", 30)))
+        out, path = tmp_path / "shots", tmp_path / "edit.otio"
+
+        def spaces() -> dict[str, str | None]:
+            return {row["name"]: row.get("input_space") for row in manifest(out)["shots"]}
+
+        save(timeline(clip("A", take, 2, 4), clip("B", take, 12, 4)), path)
+        one = ("--only", "A", "--force", "--input-space")
+        assert analyze(path, out, *one, "ACEScg") == 0  # the first command of the show
+        assert analyze(path, out) == 0
+        assert spaces() == {"A": "ACEScg", "B": None}
+        assert "conversion" not in sidecar(out, "B")["clip"]
+        assert analyze(path, out, "--only", "B", "--input-space", "ACEScct") == 0
+        # C is new, and B is longer.
+        save(timeline(clip("A", take, 2, 4), clip("B", take, 12, 8), clip("C", take, 22, 4)), path)
+        assert analyze(path, out, *one, "ACES2065-1") == 0
+        assert spaces() == {"A": "ACES2065-1", "B": "ACEScct", "C": None}
+        assert analyze(path, out) == 0
+        assert "conversion" not in sidecar(out, "C")["clip"]
+        assert sidecar(out, "B")["clip"]["encoding"] == "ACEScct"
 
     def test_a_shot_of_another_config(self, cut_movie: Path, tmp_path: Path) -> None:
         out, own = tmp_path / "shots", tmp_path / "own.ocio"

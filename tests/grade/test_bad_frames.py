@@ -14,6 +14,7 @@ from clip_files import TimeCode, write_image, write_movie
 
 from palette4d.cli import main
 from palette4d.common.errors import Palette4dError
+from palette4d.grade.document import Document
 from palette4d.grade.rendering import render
 from palette4d.media.clip import open_clip
 from palette4d.media.timecode import TIMECODE, start_timecode
@@ -199,7 +200,7 @@ class TestAgain:
         assert "frame 3" not in said.err
 
     @pytest.mark.parametrize("extension", ["png", "exr", "tif", "dpx", "jpg"])
-    def test_damaged_and_older_frames_are_rendered_again(
+    def test_damaged_frames_and_those_of_another_grade_are_rendered_again(
         self, tmp_path: Path, extension: str
     ) -> None:
         sidecar = tmp_path / "s.p4d.json"
@@ -221,15 +222,18 @@ class TestAgain:
         assert any("3 damaged" in note for note in done.notes)
         assert (tmp_path / f"o.1.{extension}").stat().st_size == len(whole)  # EXR has its time
         assert render(sidecar, clip, out, skip_existing=True, **NONE).frames == []
-        if os.name != "nt":  # an earlier grade comes back with its time
-            earlier = tmp_path / "earlier.p4d.json"
-            earlier.write_bytes(PLAIN.read_bytes())
-            os.utime(earlier, (0, 0))
-            earlier.replace(sidecar)
-            assert render(sidecar, clip, out, skip_existing=True, **NONE).frames == [1, 2, 3, 4]
         later = (tmp_path / f"o.2.{extension}").stat().st_mtime + 10
         os.utime(sidecar, (later, later))
+        document = Document.load(sidecar)
+        document.save_version("kept")
+        document.save()
+        assert render(sidecar, clip, out, skip_existing=True, **NONE).frames == []
+        document.reset()
+        done = render(document, clip, out, skip_existing=True, **NONE)  # whatever the file holds
+        assert done.frames == [1, 2, 3, 4]
+        assert any("4 of another grade" in note for note in done.notes)
         assert render(sidecar, clip, out, skip_existing=True, **NONE).frames == [1, 2, 3, 4]
+        assert render(sidecar, clip, out, skip_existing=True, strength=0.5).frames == [1, 2, 3, 4]
 
     @pytest.mark.parametrize("output", ["o.#.png", "o.mov"])
     def test_what_is_of_the_grade_before_an_edit_is_rendered_again(
@@ -240,7 +244,9 @@ class TestAgain:
         clip = sequence(tmp_path / "in", [1, 2, 3])
 
         def edit(*_: int) -> None:
-            sidecar.write_bytes(PLAIN.read_bytes())
+            document = Document.load(sidecar)
+            document.reset()
+            document.save()
 
         render(sidecar, clip, tmp_path / output, progress=edit, **NONE)
         assert render(sidecar, clip, tmp_path / output, skip_existing=True, **NONE).frames
@@ -267,8 +273,12 @@ class TestAgain:
         assert out.stat().st_mtime_ns == status
         assert self.run(*words, "--frames", "1-2") == 0
         assert count(out) == 2
-        later = out.stat().st_mtime + 10
-        os.utime(sidecar, (later, later))
+        status = out.stat().st_mtime_ns
+        assert self.run(*words, "--frames", "1-2") == 0
+        assert out.stat().st_mtime_ns == status
+        document = Document.load(sidecar)
+        document.reset()
+        document.save()
         assert self.run(*words, "--frames", "1-2") == 0
         assert out.stat().st_mtime_ns != status
 

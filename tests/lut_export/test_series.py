@@ -182,6 +182,34 @@ class TestResuming:
             export(EDITED, tmp_path, options(0, 4, **change))
         assert state(tmp_path) == before
 
+    def test_a_config_that_changed_under_its_name_is_refused_and_forced(
+        self, tmp_path: Path
+    ) -> None:
+        config, folder = tmp_path / "own.ocio", tmp_path / "l"
+
+        def write(gain: float) -> None:
+            made = ocio.Config.CreateFromBuiltinConfig("ocio://studio-config-latest")
+            scale = ocio.MatrixTransform(np.diag([gain, gain, gain, 1]).ravel())
+            space = made.getColorSpace("ACEScg")
+            steps = [space.getTransform(ocio.COLORSPACE_DIR_TO_REFERENCE), scale]
+            group = ocio.GroupTransform(steps)
+            made.addColorSpace(
+                ocio.ColorSpace(name="mine", encoding="scene-linear", toReference=group)
+            )
+            config.write_text(made.serialize(), "utf-8")
+
+        request = options(0, 4, space="mine", ocio_config=str(config))
+        write(1)
+        export(EDITED, folder, request)
+        assert export(EDITED, folder, request).kept == [0, 4]
+        before = state(folder)
+        write(2)
+        with pytest.raises(Palette4dError, match="other options"):
+            export(EDITED, folder, request)
+        assert state(folder) == before
+        assert export(EDITED, folder, replace(request, force=True)).baked == [0, 4]
+        assert all(state(folder)[name][0] != data for name, (data, _) in before.items())
+
     def test_another_edit_is_refused_and_forced(
         self, write_sidecar: Callable[..., Path], tmp_path: Path
     ) -> None:

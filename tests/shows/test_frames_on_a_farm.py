@@ -101,7 +101,17 @@ def test_a_task_leaves_out_bad_frames(tmp_path: Path) -> None:
     data = sidecar.dumps(sidecar.load(EDITED)).encode()
     pattern = FramePattern.parse(str(tmp_path / "o.####.png"))
     task = FramesTask(
-        data, clip, None, (1, 2), Output(), None, "input", "leave out", pattern, "uint8"
+        data,
+        clip,
+        None,
+        (1, 2),
+        Output(),
+        None,
+        "input",
+        "leave out",
+        pattern,
+        "uint8",
+        "palette4d",
     )
     found = render_frames(task, 1)
     assert list(found.content) == [1]

@@ -97,8 +97,20 @@ def _of_analysis(args: argparse.Namespace) -> Needs | None:
     files += [output, *sandbox.parts(output if args.detect_shots else output.parent, SIDECARS)]
     files += [] if args.like is None else [args.like]
     if args.detect_shots:
+        files += _configs_of_shots(output)
         return Needs(Promise(output, ".json", below=True), [], args.clip, files, starts=True)
     return Needs(Promise.of_file(output), [], args.clip, files)
+
+
+def _configs_of_shots(folder: Path) -> Iterator[Path]:
+    """Yield what the configs of single shots, which an earlier run recorded, read."""
+    from palette4d.colour.ocio_config import files_of_config
+    from palette4d.shows import manifest
+
+    for path in folder.glob(f"*{manifest.ENDING}"):
+        with contextlib.suppress(Palette4dError, OSError):  # the verb says so
+            for entry in manifest.read(path).entries:
+                yield from files_of_config(entry.spaces.get("ocio_config", ""))
 
 
 def _of_edit(args: argparse.Namespace) -> Needs:

@@ -198,7 +198,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--skip-existing",
         action="store_true",
-        help="keep whole files that are not older than the sidecar",
+        help="keep files that are whole and of this grade, which they name, and files by others",
     )
     parser.add_argument(
         "--missing",

@@ -204,14 +204,6 @@ def replacing(
     _sync_folder(path.parent)
 
 
-def date(path: Path, time: int) -> None:
-    """Set when a file that was just written was changed, in nanoseconds; of a link its own time."""
-    if locking.delegate is not None and not locking.delegate.owns(path):
-        locking.delegate.date(path, time)
-        return
-    os.utime(path, ns=(time, time), follow_symlinks=sys.platform == "win32")
-
-
 @contextmanager
 def in_use(path: Path) -> Generator[None]:
     """Lock a file, so that it is not left over for other processes; also once it is renamed."""

@@ -131,10 +131,6 @@ class Writer:
         finally:
             temporary.unlink(missing_ok=True)
 
-    def date(self, path: Path, time: int) -> None:
-        """Give a file that was placed a time (`files.date`)."""
-        self.ask("date", os.fspath(path.absolute()), time)
-
     @contextlib.contextmanager
     def locked(self, target: Path) -> Iterator[Callable[[], None]]:
         """Hold the lock of a file (`locking.locked`)."""
@@ -182,7 +178,6 @@ def _serve(promise: Promise, requests: IO[str], answers: IO[bytes]) -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # it ends with the command
     held: list[Callable[[], None]] = []
-    placed: set[str] = set()
     with contextlib.ExitStack() as stack, contextlib.ExitStack() as lock:
         folder = _own_folder(promise, stack)
 
@@ -190,9 +185,6 @@ def _serve(promise: Promise, requests: IO[str], answers: IO[bytes]) -> None:
             if what == "place" and folder is not None:
                 name, path, force = arguments
                 _place(_taken(folder, name), Path(path), force, promise)
-                placed.add(path)
-            elif what == "date" and arguments[0] in placed:
-                files.date(Path(arguments[0]), int(arguments[1]))
             elif what == "make_folder" and promise.leads_to(Path(arguments[0])):
                 files.make_folder(Path(arguments[0]))
             elif what == "lock" and promise.holds(Path(arguments[0])):

@@ -61,8 +61,10 @@ class Fit:
         The picks whose colour is not in the target's clip, with what they are, for people.
     everywhere : tuple of str
         The ids of copied picks that have a window in the source: windows are not copied.
+    unlearned : tuple of str
+        The ids of copied picks that take all of their hue, as there is no clip to learn from.
     nothing : bool
-        All of the grade are such picks: nothing is copied.
+        All of the grade are picks that are left out: nothing is copied.
     """
 
     change: float
@@ -71,6 +73,7 @@ class Fit:
     foreign: float
     left_out: tuple[str, ...] = ()
     everywhere: tuple[str, ...] = ()
+    unlearned: tuple[str, ...] = ()
     nothing: bool = False
 
     @property
@@ -100,6 +103,9 @@ class Fit:
         if self.everywhere:
             why = "that is a place in the other clip"
             text += f"; without a window, since {why}: {', '.join(self.everywhere)}"
+        if self.unlearned:
+            why = "the clip was not found"
+            text += f"; of all colours of their hue, since {why}: {', '.join(self.unlearned)}"
         return text
 
 
@@ -170,12 +176,18 @@ def copied(
         for pick in source.picks
         if pick.window and pick.id in copies and not copies[pick.id].window
     ]
+    unlearned = [
+        pick.id
+        for pick in source.picks
+        if pick.matte and pick.id in copies and clip.open() is None
+    ]
     label = f"copy the grade of {source.members['clip']['name']}"
     measured = fit(after, source, time)
     whole = replace(
         measured,
         left_out=tuple(left_out),
         everywhere=tuple(everywhere),
+        unlearned=tuple(unlearned),
         nothing=bool(left_out) and not after.edited,
     )
     return after.labelled(label), whole

@@ -45,10 +45,12 @@ class MoviePlan:
         codec: str | None,
         crf: int | None,
         sound: bool,
+        made_by: str,
     ) -> MoviePlan:
-        """Plan a movie; OutputError if the codec does not fit."""
+        """Plan a movie that states `made_by`; OutputError if the codec does not fit."""
         rate = rate_of(clip, document)
-        delivery = Delivery.plan(path, _stated(clip, rate), alpha=alpha, codec=codec, crf=crf)
+        stated = _stated(clip, rate, made_by)
+        delivery = Delivery.plan(path, stated, alpha=alpha, codec=codec, crf=crf)
         delivery.check_size(path, *size)
         copied, lost = None, []
         if sound and isinstance(clip, MovieClip):
@@ -104,7 +106,7 @@ def movie_notes(clip: Clip, delivery: Delivery, size: tuple[int, int]) -> list[s
     return notes
 
 
-def _stated(clip: Clip, rate: Fraction) -> Stated:
+def _stated(clip: Clip, rate: Fraction, made_by: str) -> Stated:
     """Return what a movie of the clip's frames states; its timecode is that of the first frame.
 
     Floats have room above white and below black, as Y'CbCr has; highlights of scene-linear clips
@@ -114,4 +116,5 @@ def _stated(clip: Clip, rate: Fraction) -> Stated:
     if start and clip.is_movie:
         start = moved(start, clip.frames[0], rate)
     display = clip.depth in FLOATS and "linear" not in clip.encoding
-    return replace(clip.stated, timecode=start, headroom=clip.stated.headroom or display)
+    headroom = clip.stated.headroom or display
+    return replace(clip.stated, timecode=start, headroom=headroom, made_by=made_by)

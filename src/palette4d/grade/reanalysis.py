@@ -2,9 +2,12 @@
 
 import itertools
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from palette4d.common import sandbox
+from palette4d.common.child import Child
 from palette4d.common.errors import SidecarError
 from palette4d.common.files import link_target, replacing
 from palette4d.grade import sidecar
@@ -16,17 +19,21 @@ from palette4d.grade.handle_edits import reset
 from palette4d.grade.members import Fields, history_of
 from palette4d.grade.sidecar import OnEdits, Saved
 from palette4d.grade.versions import save_version, set_note
+from palette4d.media.clip_files import files_of
 
 #: `quality.options.method` of a palette that `analyze --like` moved.
 _MOVED = "like"
 
 
-def save(fields: Fields, path: Path, *, on_edits: OnEdits = "refuse") -> tuple[Saved, list[str]]:
+def save(
+    fields: Fields, path: Path, *, on_edits: OnEdits = "refuse", clip: str | None = None
+) -> tuple[Saved, list[str]]:
     """Write the sidecar of a new analysis; return what `sidecar.save` does, and notes for the user.
 
     With `on_edits` "keep" and another palette than before, the edits stay with their handles if
     these are the same (`analyze --like`). Else the grade is copied to the new palette, with its
-    versions and picks, and the old file is kept under another name.
+    versions and picks, and the old file is kept under another name. Picks learn from `clip`, by
+    default the one that `fields` name; a command that is not confined reads `clip` in a child.
     """
     target = link_target(path)
     old = sidecar.existing(target, on_edits) if on_edits == "keep" else None
@@ -41,21 +48,28 @@ def save(fields: Fields, path: Path, *, on_edits: OnEdits = "refuse") -> tuple[S
         done, undone = history_of(before, str(target))
         kept_fields = {**moved.fields(done, undone), "extra": extra}
         return sidecar.save(kept_fields, target, on_edits="drop", replaces=read), []
-    copy, notes = _copied(former, new)
+    if clip is not None and sandbox.of_command():
+        with Child(reads=files_of(clip)) as child:
+            copy, notes = child.call(_copied, read, fields, target, clip)
+    else:
+        copy, notes = _copied(read, fields, target, clip)
     kept = _former(target, read)
     if not kept.exists():
         with replacing(kept, force=False) as temporary:
             temporary.write_bytes(read)
     notes.append(f"the former palette with its edits is kept in {kept.name}")
-    step = difference(new.state, copy.state, "copy the grade of the former analysis").undoable()
-    steps: list[Edit] = [step] if step.changes else []
-    kept_fields = {**copy.fields(steps), "extra": extra}
+    kept_fields = {**copy, "extra": extra}
     return sidecar.save(kept_fields, target, on_edits="drop", replaces=read), notes
 
 
-def _copied(former: Grade, new: Grade) -> tuple[Grade, list[str]]:
-    """Return the new grade with the look of the former one and of its versions, and notes."""
-    clip, notes = ClipOfPicks.of(new), []
+def _copied(
+    read: bytes, fields: Fields, target: Path, given: str | None
+) -> tuple[Fields, list[str]]:
+    """Return the new sidecar with the look of the former one and of its versions, and notes."""
+    core, members = sidecar.decoded(read, str(target))
+    former = Grade.of(core, members, target)
+    analysed = new = Grade.of(sidecar.validate(fields, str(target)), fields, None)
+    clip, notes = ClipOfPicks.of(new, given), []
     own, other = (grade.members["clip"] for grade in (new, former))
     same = all(own[name] == other[name] for name in ("source", "size", "frames"))
     for name in former.versions:
@@ -66,8 +80,12 @@ def _copied(former: Grade, new: Grade) -> tuple[Grade, list[str]]:
         new = reset(new)
     if former.edited:
         new, fit = copied(new, former, clip, same_clip=same)
+        fit = replace(fit, nothing=False)  # the former edits do not stay here
         notes.append(f"the palette changed, so that the grade was copied: {fit}")
-    return new, notes
+    name = "copy the grade of the former analysis"
+    step = difference(analysed.state, new.state, name).undoable()
+    steps: list[Edit] = [step] if step.changes else []
+    return new.fields(steps), notes
 
 
 def _with_same_handles(old: Grade, new: Grade) -> Grade | None:

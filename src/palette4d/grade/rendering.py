@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import json
 import os
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -12,6 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from palette4d import _core
 from palette4d.common.files import make_folder
 from palette4d.common.message import Arg
 from palette4d.common.text import some_of
@@ -282,8 +285,9 @@ def render(
         Write no files for such frames. A movie has no frame numbers, so that it follows
         ``missing``.
     skip_existing : bool
-        Keep whole files that are not older than the sidecar, and render only the others: a render
-        that was interrupted goes on.
+        Keep files that are whole and name no other grade, and render only the others: a render that
+        was interrupted goes on. A frame's ``Software`` and the title of a movie's video track name
+        the grade.
     force : bool
         Replace files that exist. A clip's own files are never replaced.
     progress : callable, optional
@@ -294,7 +298,6 @@ def render(
     **picture
         What to draw: ``strength``, ``show`` and so on, as for `Document.recolour`.
     """
-    dated = existing.Dated(document.path if isinstance(document, Document) else document)
     if not isinstance(document, Document):
         document = Document.load(document)
     drawn = Output(**picture)
@@ -312,13 +315,13 @@ def render(
                 f"output {output}: {Arg('half', True)} and {Arg('bits')} are for frames, not for "
                 "movies"
             )
+        by = made_by(document, drawn, compare, space, codec, crf, sound)
         repeated = []
         if skip_existing and Path(output).exists():
-            older = existing.is_older(Path(output), document.path)
-            whole_movie = existing.is_whole_movie(Path(output), clip.frames)
-            if whole_movie and not older:
+            state = existing.movie(Path(output), clip.frames, by)
+            if state == "whole":
                 return Rendered([Path(output)], [], [], [], kept=list(clip.frames))
-            repeated = existing.again(not whole_movie, whole_movie)
+            repeated = existing.again([state])
         plan = MoviePlan.of(
             clip,
             document,
@@ -328,6 +331,7 @@ def render(
             codec=codec,
             crf=crf,
             sound=sound,
+            made_by=by,
         )
         check_targets([Path(output)], set(map(clip.file, clip.frames)), force or skip_existing)
         make_folder(Path(output).parent)
@@ -336,13 +340,14 @@ def render(
         refuse_codec(output, codec, crf)
         pattern = FramePattern.parse(output, ", or a movie OUT.mp4 or OUT.mov")
         samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)
+        by = made_by(document, drawn, compare, space, samples)
         todo, repeated = frames_to_render(
-            clip, pattern, size, document.path, skip_existing=skip_existing, force=force
+            clip, pattern, size, by, skip_existing=skip_existing, force=force
         )
         make_folder(pattern.folder)
         clip, left_out = with_surroundings(clip, pattern, drawn, compare)
         notes = [*repeated, *frame_notes(clip, pattern.extension), *left_out]
-        opened = contextlib.nullcontext(frame_files(clip, pattern, samples, dated))
+        opened = contextlib.nullcontext(frame_files(clip, pattern, samples, by))
     warnings = mismatches(document, clip, whole)
     notes = [*clip.notes, *notes]
     if tell is not None:
@@ -375,8 +380,6 @@ def render(
         finish()
         if todo and not rendered:
             raise clip.none_readable()
-    if movie:
-        dated(Path(output))
     return Rendered(
         written[:1] if movie else written,
         rendered,
@@ -440,35 +443,43 @@ def frames_to_render(
     clip: Clip,
     pattern: FramePattern,
     size: tuple[int, int],
-    sidecar: Path | None,
+    by: str,
     *,
     skip_existing: bool,
     force: bool,
 ) -> tuple[list[int], list[str]]:
     """Return the frames to write, after a check of their files, and a note on those written again.
 
-    `size` is that of the pictures.
+    `size` is that of the pictures, `by` what `made_by` returns.
     """
     targets = dict(zip(clip.frames, pattern.paths(clip.frames), strict=True))
     there = {frame: path for frame, path in targets.items() if skip_existing and path.is_file()}
-    damaged = {f for f, path in there.items() if not existing.is_whole_frame(path, size)}
-    older = {f for f, path in there.items() if existing.is_older(path, sidecar)} - damaged
-    for done in there.keys() - damaged - older:
-        del targets[done]
+    states = {frame: existing.frame(path, size, by) for frame, path in there.items()}
+    todo = [frame for frame in targets if states.get(frame) != "whole"]
     inputs = set(map(clip.file, clip.frames))
-    check_targets(list(targets.values()), inputs, force or skip_existing)
-    return list(targets), existing.again(len(damaged), len(older))
+    check_targets([targets[frame] for frame in todo], inputs, force or skip_existing)
+    return todo, existing.again(list(states.values()))
+
+
+def made_by(document: Document, *how: Output | str | float | None) -> str:
+    """Return what a file says of its origin; `how` is how it was drawn and stored.
+
+    A hash tells grades apart: their palettes, edits and colour spaces, not their clips' names.
+    """
+    fields = document.fields()
+    clip = {n: v for n, v in fields["clip"].items() if n not in ("name", "source")}
+    state = json.dumps([clip, fields["polytope"], fields["edits"], how], default=asdict)
+    digest = hashlib.sha256(state.encode()).hexdigest()
+    return f"palette4d {_core.__version__}, grade {digest[:16]}"
 
 
 _Write = Callable[[Image, F32], Path]
 
 
-def frame_files(
-    clip: Clip, pattern: FramePattern, samples: str, dated: Callable[[Path], None]
-) -> _Write:
+def frame_files(clip: Clip, pattern: FramePattern, samples: str, by: str) -> _Write:
     """Return a function that writes a frame to its file, with the source frame's metadata.
 
-    `dated` is called after each file.
+    `by` is what `made_by` returns.
     """
 
     def write(image: Image, pixels: F32) -> Path:
@@ -482,11 +493,11 @@ def frame_files(
         if image.around is not None and isinstance(clip, ImageClip) and clip.whole:
             held = image.around.file != clip.file(image.frame)
             own = timecode_in(metadata) if held else None
-            write_around(path, image.around, pixels, samples, own)
+            write_around(path, image.around, pixels, samples, own, software=by)
         else:
             premultiplied = clip.premultiplied
+            metadata += (("Software", "string", by),)
             write_frame(path, pixels, samples, premultiplied=premultiplied, metadata=metadata)
-        dated(path)
         return path
 
     return write

@@ -1,64 +1,35 @@
-"""Whether files of an earlier render can stay: whole, and not older than the sidecar."""
+"""What files of an earlier render are: whole, damaged, or of another grade."""
 
 from __future__ import annotations
 
-import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 from palette4d.common.errors import Palette4dError
-from palette4d.common.files import date
 from palette4d.media import oiio_text
 from palette4d.media.clip import open_clip
 from palette4d.media.exr_around import has_every_block
 
+#: What `grade.rendering.made_by` returns.
+_MADE_BY = re.compile(r"palette4d \S+, grade [0-9a-f]{16}")
+State = Literal["whole", "damaged", "of another grade"]
 
-def is_older(path: Path, sidecar: Path | None) -> bool:
-    """Whether a file was written before the sidecar was saved, or put there.
 
-    A copy or another name may bring an earlier time of saving with it.
+def frame(path: Path, size: tuple[int, int], made_by: str) -> State:
+    """Look at a file that should be an image of (width, height), down to its last row.
+
+    One that names no grade, such as a frame that was retouched, is of none.
     """
-    if sidecar is None or not sidecar.is_file():
-        return False
-    about = sidecar.stat()
-    return path.stat().st_mtime < max(about.st_mtime, about.st_ctime)
-
-
-class Dated:
-    """Gives files the time of the sidecar that they are of, once that was saved meanwhile.
-
-    So they are older than the sidecar that is there. Make one before the sidecar is read.
-    """
-
-    def __init__(self, sidecar: str | os.PathLike[str] | None) -> None:
-        self._sidecar = sidecar
-        self._before = self._times()
-
-    def __call__(self, path: Path) -> None:
-        """Look after a file that was just written."""
-        if self._before is not None and self._before != self._times():
-            date(path, self._before[0])
-
-    def _times(self) -> tuple[int, int] | None:
-        if self._sidecar is None:
-            return None
-        try:
-            about = Path(self._sidecar).stat()
-        except OSError:
-            return 0, 0
-        return about.st_mtime_ns, about.st_ctime_ns
-
-
-def is_whole_frame(path: Path, size: tuple[int, int]) -> bool:
-    """Whether a file is an image of (width, height) whose last row can be read."""
     import OpenImageIO as oiio
 
     if not path.is_file() or not path.stat().st_size:
-        return False
+        return "damaged"
     source = oiio.ImageInput.open(oiio_text.file_name(path))
     if source is None:
         oiio_text.problem_of(oiio)
-        return False
+        return "damaged"
     spec = source.spec()
     if path.suffix.lower() in (".tif", ".tiff"):  # rows may stand in any order
         read = source.read_image(0, 0, 0, spec.nchannels, spec.format)
@@ -70,22 +41,27 @@ def is_whole_frame(path: Path, size: tuple[int, int]) -> bool:
     rows = not spec.tile_width
     source.close()
     if whole and rows and path.suffix.lower() == ".exr":
-        return has_every_block(path)
-    return whole
+        whole = has_every_block(path)
+    return _state(whole, spec.get_string_attribute("Software"), made_by)
 
 
-def is_whole_movie(path: Path, frames: Sequence[int]) -> bool:
-    """Whether a file is a movie of as many frames."""
-    if not path.is_file():
-        return False
+def movie(path: Path, frames: Sequence[int], made_by: str) -> State:
+    """Look at a file that should be a movie of as many frames."""
     try:
-        return len(open_clip(str(path)).frames) == len(frames)
+        clip = open_clip(str(path))
     except (Palette4dError, OSError):
-        return False
+        return "damaged"
+    return _state(len(clip.frames) == len(frames), clip.stated.made_by, made_by)
 
 
-def again(damaged: int, older: int) -> list[str]:
+def _state(whole: bool, text: str, made_by: str) -> State:
+    if not whole:
+        return "damaged"
+    return "of another grade" if _MADE_BY.fullmatch(text) and text != made_by else "whole"
+
+
+def again(states: Sequence[State]) -> list[str]:
     """Return a note on the files of an earlier render that are rendered again."""
-    counts = [(damaged, "damaged"), (older, "older than the sidecar")]
-    counted = [f"{count} {word}" for count, word in counts if count]
+    kinds: tuple[State, ...] = ("damaged", "of another grade")
+    counted = [f"{states.count(kind)} {kind}" for kind in kinds if kind in states]
     return [f"files rendered again: {', '.join(counted)}"] if counted else []

@@ -28,6 +28,8 @@ def write_around(
     pixels: NDArray[np.float32],
     samples: str,
     timecode: str | None = None,
+    *,
+    software: str,
 ) -> None:
     """Write a copy of an EXR whose picture is replaced, under a temporary name, and rename it.
 
@@ -38,6 +40,7 @@ def write_around(
     pixels : (h, w, 3 or 4) float32, premultiplied; of the picture's whole data window.
     samples : "half" or "float", for the picture's channels; others keep their types.
     timecode : the frame's, `HH:MM:SS:FF`; by default the file's own.
+    software : the program that made the copy.
 
     Raises
     ------
@@ -59,6 +62,7 @@ def write_around(
         channels[name].pixels = np.ascontiguousarray(planes[..., index])
     for part in file.parts:
         _lossless_rows(part.header)
+        part.header["software"] = software
         if timecode is not None:
             _set_timecode(part.header, timecode)
     with replacing(path, force=True) as temporary:

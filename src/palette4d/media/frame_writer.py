@@ -30,7 +30,7 @@ _EXPECTED = ".exr, .png, .tif, .dpx or .jpg"
 # What each format can hold of the metadata that `palette4d.media.clip_images` reads. Names with a
 # colon are a format's own: only a copy in that format keeps them.
 _TEXT = ("oiio:ColorSpace", "ICCProfile", "DateTime", "Copyright", "Artist", "ImageDescription")
-_PLAIN = (*_TEXT, "PixelAspectRatio")
+_PLAIN = (*_TEXT, "Software", "PixelAspectRatio")
 _METADATA: dict[str, tuple[str, ...]] = {
     "png": (*_PLAIN, "CICP"),
     "jpg": (*_PLAIN, "Make", "Model"),

@@ -59,6 +59,7 @@ def stated_by(container: Any, stream: Any, picture: av.VideoFrame) -> Stated:
         ),
         handler=str(stream.metadata.get("handler_name", "")),
         hdr10=_hdr10(picture),
+        made_by=str(stream.metadata.get("name", "")),
     )
 
 

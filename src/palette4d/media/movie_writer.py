@@ -238,6 +238,7 @@ def _stream(movie: Any, size: tuple[int, int], rate: Fraction, how: Delivery) ->
         context.codec_tag = "hvc1"  # which QuickTime needs
     movie.metadata.update(stated.texts)
     own = {"timecode": stated.timecode, "reel_name": stated.reel, "handler_name": stated.handler}
+    own["title"] = stated.made_by  # of the track; FFmpeg reads it as "name"
     for name, text in own.items():
         if text:
             stream.metadata[name] = text

@@ -27,6 +27,7 @@ class Stated:
     texts : (name, text) of a movie's other metadata, such as its title and time of creation.
     handler : name of a movie's video track, or "".
     hdr10 : mastering display and light levels, as the options of x265; "" if there are none.
+    made_by : program and grade that made a movie, in its video track's title, or "".
     """
 
     tags: ColourTags = field(default_factory=ColourTags)
@@ -39,3 +40,4 @@ class Stated:
     texts: tuple[tuple[str, str], ...] = ()
     handler: str = ""
     hdr10: str = ""
+    made_by: str = ""

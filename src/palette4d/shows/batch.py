@@ -138,11 +138,13 @@ class Show:
         before = manifests.read(self.path) if self.path.exists() else None
         known = {} if before is None else {entry.shot.name: entry for entry in before.entries}
         spaces = dataclasses.asdict(options.spaces) if options.spaces.asked else {}
-        recorded = options.analysis.recorded() | spaces
+        recorded = options.analysis.recorded()
         self.own: dict[str, str] = {}  # of the chosen shots
-        if before is not None and options.only:
-            # What is not given is the show's.
-            self.own, recorded = {**_given(before.options), **_given(spaces)}, before.options
+        if not options.only:
+            recorded |= spaces
+        else:
+            recorded = recorded if before is None else before.options
+            self.own = {**_given(recorded), **_given(spaces)}  # what is not given is the show's
         self._head = Manifest(
             source=self.beside(source.file),
             source_sha256=source.sha256,
@@ -185,7 +187,7 @@ class Show:
     def plan(self, shot: Shot, before: Entry | None) -> None:
         """Decide whether to keep or to analyse a shot."""
         own = dataclasses.replace(shot, clip=self.beside(shot.clip), problem="")
-        entry = Entry(own, spaces=self.spaces_for(before))
+        entry = Entry(own, spaces=self.spaces_for(shot.name, before))
         chosen = not self.options.only or shot.name in self.options.only
         if before is not None and not chosen and self.stays(before, own):
             place = dataclasses.replace(before.shot, used=own.used, place=own.place)
@@ -208,9 +210,10 @@ class Show:
                 entry = dataclasses.replace(entry, status=FAILED, error=error.message.marked)
         self.entries[shot.name] = entry
 
-    def spaces_for(self, before: Entry | None) -> Mapping[str, str]:
-        """Return a shot's own colour spaces: `only` gives them, and without it they stay."""
-        own = self.own if self.options.only or before is None else before.spaces
+    def spaces_for(self, name: str, before: Entry | None) -> Mapping[str, str]:
+        """Return a shot's own colour spaces: `only` gives them to its shots, others keep theirs."""
+        kept = {} if before is None else before.spaces
+        own = self.own if name in self.options.only else kept
         return {} if own == _given(self._head.options) else own
 
     def task(self, shot: Shot, entry: Entry) -> ShotTask:
@@ -273,7 +276,7 @@ class Show:
 
     def same_spaces(self, before: Entry) -> bool:
         """Whether a shot has the colour spaces of the analysis before."""
-        wanted = self.spaces_for(before) or _given(self._head.options)
+        wanted = self.spaces_for(before.shot.name, before) or _given(self._head.options)
         return wanted == (before.spaces or _given(self.before))
 
     def beside(self, clip: str) -> str:
@@ -294,7 +297,8 @@ class Show:
             if played := _played(entry.shot, (frames["first"], frames["last"])):
                 document["extra"]["edit"] = played
             target = self.folder / entry.sidecar
-            _, notes = reanalysis.save(document, target, on_edits=self.options.on_edits)
+            clip = self.tasks[name].clip
+            _, notes = reanalysis.save(document, target, on_edits=self.options.on_edits, clip=clip)
             ends = (frames["first"], frames["last"])
             self.entries[name] = dataclasses.replace(entry, status=DONE, frames=ends)
             self.analysed.append(name)

@@ -22,7 +22,6 @@ from palette4d.grade.document import Document
 from palette4d.grade.output import Output
 from palette4d.grade.rendering import Missing, Painter, Rendered
 from palette4d.jobs.workers import Failed, Workers
-from palette4d.media import existing
 from palette4d.media.clip import Clip, open_clip
 from palette4d.media.codecs import is_movie
 from palette4d.media.frame_tags import frame_notes
@@ -45,6 +44,7 @@ class FramesTask:
     frames : those of this task.
     drawn, compare, space, missing : as `Painter` has them.
     pattern, samples : of the files.
+    by : what `rendering.made_by` returns.
     """
 
     sidecar: bytes
@@ -57,6 +57,7 @@ class FramesTask:
     missing: Missing | Literal["leave out"]
     pattern: FramePattern
     samples: str
+    by: str
 
 
 @dataclass(frozen=True)
@@ -97,10 +98,9 @@ def render(
         return rendering.render(document, clip, output, **arguments)
     if isinstance(clip, Clip):
         raise Palette4dError(f"{Arg('cluster')} needs the clip's name, by which workers open it")
-    dated = existing.Dated(document.path if isinstance(document, Document) else document)
     if not isinstance(document, Document):
         document = Document.load(document)
-    return _on_farm(document, os.fspath(clip), Path(output), cluster, dated, **arguments)
+    return _on_farm(document, os.fspath(clip), Path(output), cluster, **arguments)
 
 
 def _on_farm(
@@ -108,7 +108,6 @@ def _on_farm(
     spec: str,
     output: Path,
     cluster: str,
-    dated: existing.Dated,
     *,
     frames: str | None = None,
     compare: rendering.Compare | None = None,
@@ -137,13 +136,15 @@ def _on_farm(
     clip, fill = rendering.opened_for_render(spec, frames, missing, skip_bad_frames, movie=False)
     pattern = FramePattern.parse(str(output))
     samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)
+    drawn = Output(**picture)
+    by = rendering.made_by(document, drawn, compare, space, samples)
     size = clip.width * (2 if compare == "side" else 1), clip.height
     todo, repeated = rendering.frames_to_render(
-        clip, pattern, size, document.path, skip_existing=skip_existing, force=force
+        clip, pattern, size, by, skip_existing=skip_existing, force=force
     )
     make_folder(pattern.folder)
     warnings = rendering.mismatches(document, clip, frames is None)
-    _, left_out = rendering.with_surroundings(clip, pattern, Output(**picture), compare)
+    _, left_out = rendering.with_surroundings(clip, pattern, drawn, compare)
     notes = [*clip.notes, *repeated, *frame_notes(clip, pattern.extension), *left_out]
     if tell is not None:
         for kind, texts in (("warning", warnings), ("note", notes)):
@@ -152,10 +153,9 @@ def _on_farm(
     data = sidecar.dumps(document.fields()).encode("utf-8")
     at_once = OF_MOVIE if clip.is_movie else FRAMES
     rows = [tuple(todo[i : i + at_once]) for i in range(0, len(todo), at_once)]
-    drawn = Output(**picture)
     place = str(Path.cwd() / spec)
     tasks = {
-        row: FramesTask(data, place, frames, row, drawn, compare, space, fill, pattern, samples)
+        row: FramesTask(data, place, frames, row, drawn, compare, space, fill, pattern, samples, by)
         for row in rows
     }
     done = Rendered([], [], [], [*warnings, *notes], sorted(set(clip.frames) - set(todo)))
@@ -172,7 +172,6 @@ def _on_farm(
             path = pattern.path(frame)
             with replacing(path, force=True) as temporary:
                 temporary.write_bytes(content)
-            dated(path)
             done.frames.append(frame)
             done.files.append(path)
         done.skipped.extend(answer.skipped)
@@ -205,7 +204,7 @@ def render_frames(task: FramesTask, threads: int) -> Files:
     content = {}
     with tempfile.TemporaryDirectory(prefix="palette4d-") as folder:
         pattern = FramePattern(Path(folder), "", task.pattern.suffix, 1)
-        write = rendering.frame_files(clip, pattern, task.samples, existing.Dated(None))
+        write = rendering.frame_files(clip, pattern, task.samples, task.by)
         for frame in task.frames:
             if (painted := painter.paint(frame)) is not None:
                 path = write(*painted)
