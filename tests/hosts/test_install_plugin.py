@@ -159,7 +159,10 @@ def test_root_installs_nothing_that_a_link_of_another_user_leads_to(
 
 
 @gifts
-@pytest.mark.parametrize("what", ["base", "pth", "later", "module", "settings", "linked"])
+@pytest.mark.parametrize(
+    "what",
+    ["base", "pth", "hidden", "later", "led", "module", "settings", "linked", "linked later"],
+)
 def test_root_installs_no_environment_of_another_users_python(
     bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
@@ -174,6 +177,13 @@ def test_root_installs_no_environment_of_another_users_python(
         monkeypatch.setattr(sys, "base_prefix", str(theirs))
     elif what == "pth":
         (site / "other.pth").write_text(f"{theirs}\n", "utf-8")
+    elif what == "hidden":
+        (site / ".other.pth").write_text(f"\ufeff{theirs}\n", "utf-8")
+    elif what == "led":
+        (tmp_path / "link").symlink_to(theirs / "later")
+        (site / "other.pth").write_text(f"{tmp_path / 'link'}/lib\n", "utf-8")
+    elif what == "linked later":
+        (site / "sitecustomize.py").symlink_to(theirs / "later.py")
     elif what == "later":
         (site / "other.pth").write_text(f"# a comment\n{theirs}/later/lib\n", "utf-8")
     elif what == "module":
@@ -188,6 +198,24 @@ def test_root_installs_no_environment_of_another_users_python(
     install_bundle(bundle, tmp_path / "OFX")
     os.chown(theirs, 12345, 12345)
     with pytest.raises(Palette4dError, match=r"theirs belongs to another user"):
+        install_bundle(bundle, tmp_path / "OFX")
+
+
+@gifts
+def test_root_installs_no_environment_that_names_what_all_may_make(
+    bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A folder such as /tmp keeps the files of others, but not names that are free."""
+    venv = pytest.importorskip("venv", reason="Windows' embedded Python has none")
+    venv.create(tmp_path / "venv")
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "venv/bin/python"))
+    (site,) = (tmp_path / "venv/lib").glob("*/site-packages")
+    (tmp_path / "open" / "there").mkdir(parents=True)
+    (tmp_path / "open").chmod(0o1777)
+    (site / "other.pth").write_text(f"{tmp_path / 'open/there'}\n", "utf-8")
+    install_bundle(bundle, tmp_path / "OFX")
+    (site / "other.pth").write_text(f"{tmp_path / 'open/later'}\n", "utf-8")
+    with pytest.raises(Palette4dError, match=r"open may be changed by other users"):
         install_bundle(bundle, tmp_path / "OFX")
 
 

@@ -177,9 +177,7 @@ def copied(
         if pick.window and pick.id in copies and not copies[pick.id].window
     ]
     unlearned = [
-        pick.id
-        for pick in source.picks
-        if pick.matte and pick.id in copies and clip.open() is None
+        pick.id for pick in source.picks if pick.matte and pick.id in copies and clip.open() is None
     ]
     label = f"copy the grade of {source.members['clip']['name']}"
     measured = fit(after, source, time)

@@ -152,21 +152,16 @@ def _reason(error: OSError) -> str:
 
 #: Prints Python's folders of modules, also those that files *.pth name and that are not there yet.
 _MODULE_FOLDERS = """
-import glob, os, sys
+import os, sys
 print(*sys.path, sep="\\n")
-for file in [file for folder in sys.path for file in glob.glob(glob.escape(folder) + "/*.pth")]:
-    with open(file, encoding="utf-8", errors="surrogateescape") as lines:
-        for line in map(str.strip, lines):
-            if line and not line.startswith(("#", "import ", "import\\t")):
-                print(os.path.join(os.path.dirname(file), line))
+for folder in filter(os.path.isdir, sys.path):
+    for name in [name for name in os.listdir(folder) if name.endswith(".pth")]:
+        file = os.path.join(folder, name)
+        with open(file, encoding="utf-8-sig", errors="surrogateescape") as lines:
+            for line in map(str.strip, lines):
+                if line and not line.startswith(("#", "import ", "import\\t")):
+                    print(os.path.join(folder, line))
 """
-
-
-def _there(path: Path) -> Path:
-    """Return a path, or the folder where what is missing of it would be made."""
-    while not path.exists():
-        path = path.parent
-    return path
 
 
 def _refuse_others_program(bundle: Path) -> None:
@@ -179,8 +174,8 @@ def _refuse_others_program(bundle: Path) -> None:
     within = (*folders.splitlines(), str(Path(__file__).parents[1]), str(bundle))
     for text in (*above, *within):
         path = Path(text)
-        check = changeable_within if text in within else changeable
-        problem = (check if path.exists() else changeable)(_there(path))
+        check = changeable_within if text in within and path.exists() else changeable
+        problem = check(path)
         if problem is not None:
             raise Palette4dError(
                 f"{path}: {problem}. Every user's node would run what that one puts there. Install "

@@ -17,12 +17,13 @@ MOST_LINKS = 40
 def changeable(path: Path, owner: int = 0) -> str | None:
     """Return what is wrong with a path that others than root and `owner` could change, or None.
 
-    Looked at are the path, each link on the way and where it leads, and all folders above these.
-    The node does the same before it starts a program (`node/program_file.cpp`).
+    Looked at are the path, each link on the way and where it leads, and all folders above these;
+    of a path that is not there, whether others could make it. The node does the same before it
+    starts a program (`node/program_file.cpp`).
 
     Parameters
     ----------
-    path : absolute path of a file or a folder that exists
+    path : absolute path of a file or a folder
     owner : int
         The user who may change it besides root.
     """
@@ -34,6 +35,8 @@ def changeable(path: Path, owner: int = 0) -> str | None:
             done = done.parent
             continue
         place = done / name
+        if not os.path.lexists(place):
+            return _changeable_itself(done, owner, new=True)
         problem = _changeable_itself(place, owner)
         if place.is_symlink():
             target, links = place.readlink(), links + 1
@@ -55,21 +58,24 @@ def changeable_within(folder: Path, owner: int = 0) -> str | None:
             if about.st_uid in (0, owner) and not about.st_mode & 0o022:  # nearly all; links not
                 continue
             place = Path(parent, name)
-            leads = place.is_symlink() and place.exists()
-            problem = problem or (changeable if leads else _changeable_itself)(place, owner)
+            check = changeable if place.is_symlink() else _changeable_itself
+            problem = problem or check(place, owner)
         if problem is not None:
             return problem
     return problem
 
 
-def _changeable_itself(place: Path, owner: int) -> str | None:
-    """Return what is wrong with a file, a folder or a link, whatever is above it."""
+def _changeable_itself(place: Path, owner: int, new: bool = False) -> str | None:
+    """Return what is wrong with a file, a folder or a link, whatever is above it.
+
+    `new`: what is not there yet may be made in the folder.
+    """
     about = place.lstat()
     if about.st_uid not in (0, owner):
         return f"{place} belongs to another user than root"
     if stat.S_ISLNK(about.st_mode):
         return None
-    sticky = stat.S_ISDIR(about.st_mode) and about.st_mode & stat.S_ISVTX
+    sticky = not new and stat.S_ISDIR(about.st_mode) and about.st_mode & stat.S_ISVTX
     for_all = about.st_mode & stat.S_IWOTH
     # With an access list the group's bits are those of all whom it names.
     for_group = about.st_mode & stat.S_IWGRP and (about.st_gid != 0 or _has_list(place))
