@@ -53,8 +53,8 @@ from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip_base import Clip, describe, even_step
 from palette4d.media.colour_space import SpaceOptions
 
-#: The largest frame number of a sidecar (docs/sidecar.md).
-LARGEST_FRAME = 1_000_000_000
+#: The largest frame number and code value of a sidecar (docs/sidecar.md).
+LARGEST_FRAME, LARGEST_VALUE = 1_000_000_000, 1_000_000
 
 T = TypeVar("T")
 Progress = Callable[[str, int, int], object]
@@ -171,6 +171,13 @@ def analyze(
     )
     skipped = sorted(clip.skipped)
     usable, missing = _usable(clip.frames, gathered.frames)
+    gamut = Gamut.of(usable)
+    if (farthest := float(max(-gamut.low.min(), gamut.high.max()))) > LARGEST_VALUE:
+        raise Palette4dError(
+            f"{clip.source}: found code values up to {farthest:.3g} in more than single pixels, "
+            f"expected colours, of at most {LARGEST_VALUE:,}; choose another layer with "
+            f"{Arg('layer')}, or convert the clip"
+        )
     if starts := cuts.find_cuts((frame.frame, frame.histogram) for frame in usable):
         if not allow_cuts:
             raise Palette4dError(f"{clip.source}: {cuts.refusal(clip.frames, starts).marked}")

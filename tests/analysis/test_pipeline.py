@@ -258,3 +258,14 @@ def test_numbers_that_no_sidecar_holds_are_refused_at_once() -> None:
 
     with pytest.raises(Palette4dError, match="found the frame number 20261128100001"):
         pipeline.analyze(clip, progress=never)
+
+
+@pytest.mark.parametrize("share", [0.1, 1.0])
+def test_values_that_are_no_colours_are_refused_before_the_search(share: float) -> None:
+    """As of an ID layer: bits of hashes, read as floats."""
+    rng = np.random.default_rng(0)
+    frames = rng.random((4, 24, 32, 3), np.float32)
+    bits = rng.random(frames.shape[:-1]) < share
+    frames[bits] = 10 ** rng.uniform(4, 9, (int(bits.sum()), 3)).astype(np.float32)
+    with pytest.raises(Palette4dError, match=r"found code values up to .*expected colours"):
+        pipeline.analyze(ArrayClip(frames))

@@ -375,6 +375,23 @@ def test_a_link_in_place_of_the_temporary_file_is_refused(old: Path) -> None:
 
 
 @links
+@links
+def test_a_relative_path_leads_back_through_links(tmp_path: Path) -> None:
+    """`..` goes up from where a link leads, not from where it stands."""
+    far, near = tmp_path / "far" / "away", tmp_path / "near"
+    far.mkdir(parents=True)
+    near.mkdir()
+    (near / "out").symlink_to(far)
+    clip = near / "clip.####.png"
+    assert files.beside(clip, near) == "clip.####.png"
+    assert files.beside(clip, near / "grades") == "../clip.####.png"
+    for folder in (near / "out", near / "out" / "below"):
+        relative = files.beside(clip, folder)
+        assert not Path(relative).is_absolute()
+        assert Path(os.path.realpath(folder / relative)) == clip
+    assert files.beside(near / "out" / "a.mov", near / "out") == "a.mov"
+
+
 def test_a_link_that_leads_nowhere_is_replaced(tmp_path: Path) -> None:
     link = tmp_path / "link.cube"
     link.symlink_to("gone")

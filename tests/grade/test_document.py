@@ -444,6 +444,23 @@ def test_a_new_document_is_saved_beside_its_clip(
     assert len(edits_of(Path("grades/clip.p4d.json"))["vertices"]) == 1
 
 
+def test_a_document_that_is_saved_elsewhere_keeps_its_clip(tmp_path: Path) -> None:
+    (tmp_path / "shots").mkdir()
+    (tmp_path / "a" / "b").mkdir(parents=True)
+    fields = sidecar.load(GOLDEN / "v1_split.p4d.json")
+    whole = (tmp_path / "plates" / "shot.mov").as_posix()
+    for source, expected in (
+        ("shot.####.exr", "../../shots/shot.####.exr"),
+        ("../lost/shot.####.exr", "../lost/shot.####.exr"),  # was nowhere
+        (whole, whole),
+    ):
+        fields["clip"]["source"] = source
+        sidecar.save(fields, tmp_path / "shots/s.p4d.json", on_edits="drop")
+        Document.load(tmp_path / "shots/s.p4d.json").save(tmp_path / "a/b/s.p4d.json")
+        assert sidecar.load(tmp_path / "a/b/s.p4d.json")["clip"]["source"] == expected
+        (tmp_path / "a/b/s.p4d.json").unlink()
+
+
 def test_edits_of_another_file_are_not_lost_unasked(plain: Path, tmp_path: Path) -> None:
     target = tmp_path / "target.p4d.json"
     target.write_bytes((GOLDEN / "v1_edited.p4d.json").read_bytes())

@@ -95,6 +95,23 @@ def same_file(a: Path, b: Path) -> bool:
         return os.path.realpath(a) == os.path.realpath(b)
 
 
+def beside(path: Path, folder: Path) -> str:
+    """Return a path relative to a folder, with slashes, so that both may move together.
+
+    A folder that is a link has the names above it of where it leads. On another drive the path is
+    absolute.
+    """
+    path, folder = path.absolute(), folder.absolute()
+    try:
+        relative = os.path.relpath(path, folder)
+        if os.path.realpath(folder / relative) != os.path.realpath(path):
+            there = Path(os.path.realpath(path.parent), path.name)
+            relative = os.path.relpath(there, os.path.realpath(folder))
+    except ValueError:
+        return path.as_posix()
+    return Path(relative).as_posix()
+
+
 def names_a_server(path: str, named_in: Path) -> bool:
     r"""Return whether a path that a file names leads to another server than the file's own.
 

@@ -13,7 +13,7 @@ from typing import Any, Literal, TypeVar, Unpack
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
-from palette4d.common.files import link_target, same_file
+from palette4d.common.files import beside, link_target, same_file
 from palette4d.common.locking import locked
 from palette4d.common.text import counted
 from palette4d.grade import (
@@ -640,9 +640,8 @@ class Document:
             self._save_again(link_target(target), self._file)
             return
         fields = self.grade.fields(bounded(self.history.done), self.history.undone)
-        if self.path is None:
-            clip = fields["clip"]
-            fields["clip"] = {**clip, "source": _beside(clip["source"], target)}
+        clip = fields["clip"]
+        fields["clip"] = {**clip, "source": _beside(clip["source"], self.path, target)}
         (core, fields, data), notes = reanalysis.save(fields, target, on_edits=on_edits)
         self._saved(*_read(core, fields, target), data)
         self.notes += tuple(notes)
@@ -691,11 +690,13 @@ def _read(core: _core.Sidecar, fields: Fields, path: Path | None) -> tuple[Grade
     return grade, History(*history_of(fields, grade.name))
 
 
-def _beside(source: str, output: Path) -> str:
-    """Return the source relative to the sidecar's folder, so that both may move together."""
+def _beside(source: str, old: Path | None, new: Path) -> str:
+    """Return a clip's source relative to a sidecar's new folder; `old` is where it was, if it was.
+
+    A source in a folder that is not there stays.
+    """
     if not source or Path(source).is_absolute():
         return source
-    try:
-        return Path(os.path.relpath(source, output.absolute().parent)).as_posix()
-    except ValueError:  # on another drive
-        return str(Path(source).absolute())
+    clip = source if old is None else old.absolute().parent / source
+    lost = old is not None and not Path(clip).parent.is_dir()
+    return source if lost else beside(Path(clip), new.absolute().parent)

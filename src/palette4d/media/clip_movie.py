@@ -199,7 +199,8 @@ def _decode(
             stream.thread_type = "SLICE"  # frame threads would decode later pictures too
         if start and stamps:
             try:
-                container.seek(stamps[start], stream=stream, backward=True)
+                last = len(stamps) - 1  # of a movie that was cut short
+                container.seek(stamps[min(start, last)], stream=stream, backward=True)
             except FFmpegError:
                 container.seek(0)
         for pictures in _packets(container, stream, problems):

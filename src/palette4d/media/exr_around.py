@@ -54,16 +54,23 @@ def has_every_block(path: Path) -> bool:
     OpenEXR writes a full disk's file without an error then, and reads it; others do not.
     """
     with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as exr:
-        several, offset = bool(exr[5] & 0x10), 8
-        counts = []
-        while exr[offset]:
-            offset, attributes = _attributes(exr, offset)
-            counts.append(_blocks(attributes))
-            if not several:
-                break
-        offset += several  # an empty header ends the list
-        table = np.frombuffer(exr[offset : offset + 8 * sum(counts)], "<u8")
-        return len(table) == sum(counts) and bool(table.all())
+        try:
+            return _has_every_block(exr)
+        except (LookupError, ValueError):  # a table that is cut, a header of no EXR
+            return False
+
+
+def _has_every_block(exr: mmap.mmap) -> bool:
+    several, offset = bool(exr[5] & 0x10), 8
+    counts = []
+    while exr[offset]:
+        offset, attributes = _attributes(exr, offset)
+        counts.append(_blocks(attributes))
+        if not several:
+            break
+    offset += several  # an empty header ends the list
+    table = np.frombuffer(exr[offset : offset + 8 * sum(counts)], "<u8")
+    return len(table) == sum(counts) and bool(table.all())
 
 
 def _attributes(exr: Any, offset: int) -> tuple[int, dict[bytes, bytes]]:
@@ -72,6 +79,8 @@ def _attributes(exr: Any, offset: int) -> tuple[int, dict[bytes, bytes]]:
     while exr[offset]:
         kind = exr.find(b"\0", offset) + 1
         size = exr.find(b"\0", kind) + 1
+        if not kind or not size:
+            raise ValueError("the header has no end")
         value = size + 4
         end = value + int.from_bytes(exr[size:value], "little")
         attributes[exr[offset : kind - 1]] = exr[value:end]

@@ -51,12 +51,12 @@ def write_around(
 
     try:
         file = OpenEXR.File(str(around.file), separate_channels=True)
-    except (RuntimeError, OSError) as error:
+        channels = file.parts[around.part].channels
+    except (RuntimeError, OSError, LookupError, ValueError) as error:
         raise WriteError(
             f"{path}: {around.file} cannot be copied around the picture ({error}); expected an EXR "
             "that OpenEXR reads. Render to another format, or mend the file"
         ) from error
-    channels = file.parts[around.part].channels
     planes = quantised(pixels, samples)
     for index, name in enumerate(around.channels):
         channels[name].pixels = np.ascontiguousarray(planes[..., index])

@@ -22,7 +22,9 @@ from palette4d.media.colour_tags import (
 )
 from palette4d.media.exr_around import described
 from palette4d.media.exr_layers import COLOURS
+from palette4d.media.oiio_text import is_utf8
 from palette4d.media.reading import Reading
+from palette4d.media.timecode import TIMECODE
 
 #: Metadata that a recoloured copy of the frame does not keep: they describe how pixels are stored.
 _STORAGE = (
@@ -225,16 +227,29 @@ def header_of(spec: Any, chosen: list[int], part: int) -> Header:
 
 def _is_kept(param: Any) -> bool:
     """Whether a recoloured copy keeps an attribute; FFmpeg's DPX has a pixel aspect ratio of 0."""
-    if param.name == "PixelAspectRatio":
-        return bool(_LEAST_ASPECT < param.value < 1 / _LEAST_ASPECT)
-    return param.name == "oiio:ColorSpace" or not param.name.startswith(_STORAGE)
+    name, value = param.name, param.value
+    if name == "PixelAspectRatio":
+        return isinstance(value, int | float) and _LEAST_ASPECT < value < 1 / _LEAST_ASPECT
+    if name == TIMECODE and not _are_numbers(value, 2):
+        return False
+    return name == "oiio:ColorSpace" or (not name.startswith(_STORAGE) and is_utf8(name))
+
+
+def _are_numbers(value: Any, count: int, kind: Any = int) -> bool:
+    """Whether an attribute, whose type is free, has so many numbers at least."""
+    return (
+        isinstance(value, tuple)
+        and len(value) >= count
+        and all(isinstance(number, kind) for number in value)
+    )
 
 
 def _colours(spec: Any) -> tuple[str, ColourTags]:
     """Return the encoding that a file states, and the tags that mean the same."""
     space = oiio_text.readable(spec.get_string_attribute("oiio:ColorSpace"))
     stated = spec.getattribute("CICP")
-    if stated is not None and UNKNOWN not in (cicp := ColourTags(*stated[:2])).pair:
+    usable = _are_numbers(stated, 2) and all(0 <= number <= 255 for number in stated)
+    if usable and UNKNOWN not in (cicp := ColourTags(*stated[:2])).pair:
         # OpenImageIO takes pairs that it has no name for as sRGB.
         known = tags_of(space).pair == cicp.pair
         return (name_of(space) if known else encoding_of(cicp)), cicp
@@ -242,7 +257,7 @@ def _colours(spec: Any) -> tuple[str, ColourTags]:
     encoding = name_of(space) or dpx or "unknown"
     tags = tags_of(dpx) if tags_of(dpx).known else tags_of(encoding)
     xy = spec.getattribute("chromaticities")
-    if not tags.known and xy is not None and len(xy) == 8:
+    if not tags.known and _are_numbers(xy, 8, int | float):
         tags = ColourTags(primaries_of(xy))
     return encoding, tags
 
@@ -263,8 +278,10 @@ def _dpx_encoding(spec: Any) -> str:
 def _rate(spec: Any) -> Fraction | None:
     for name in _RATE_NAMES:
         value, rate = spec.getattribute(name), None
-        if isinstance(value, tuple) and len(value) == 2 and value[0] > 0 and value[1] > 0:
-            rate = Fraction(int(value[0]), int(value[1]))
+        if _are_numbers(value, 2) and min(value[:2]) > 0:
+            rate = Fraction(*value[:2])
+        elif _are_numbers(value, 2, int | float) and value[1]:
+            rate = as_rate(value[0] / value[1])
         elif isinstance(value, int | float):
             rate = as_rate(float(value))
         if rate is not None:

@@ -86,6 +86,11 @@ def video_stream(container: Any, path: Path) -> Any:
     stream = container.streams.best("video")
     if stream is None:
         raise ClipError(f"{path}: found no video stream, expected one; give a movie with a picture")
+    if stream.codec_context is None:
+        raise ClipError(
+            f"{path}: FFmpeg does not know the codec of its picture; convert the movie to one of "
+            "ProRes, DNxHR or H.264"
+        )
     return stream
 
 

@@ -22,7 +22,7 @@ def readable(value: Any) -> Any:
     >>> readable("Andr\\udce9"), readable(24.0)
     ('André', 24.0)
     """
-    if not isinstance(value, str) or _is_utf8(value):
+    if not isinstance(value, str) or is_utf8(value):
         return value
     return value.encode("utf-8", "surrogateescape").decode("latin-1")
 
@@ -36,12 +36,12 @@ def file_name(path: str | Path) -> str:
         The name is not UTF-8.
     """
     name = str(path)
-    if not _is_utf8(name):
+    if not is_utf8(name):
         shown = name.encode("utf-8", "backslashreplace").decode()
         raise Palette4dError(f"{shown}: found a name that is not UTF-8; rename the file or folder")
     return name
 
 
-def _is_utf8(text: str) -> bool:
+def is_utf8(text: str) -> bool:
     """Whether text has no bytes that Python could not decode."""
     return not any("\ud800" <= letter <= "\udfff" for letter in text)

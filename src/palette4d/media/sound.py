@@ -49,14 +49,15 @@ class Sound:
         with opened_movie(clip.path) as movie:
             video = movie.streams.best("video")
             for stream in movie.streams:
+                context = stream.codec_context
                 if stream.index == video.index or "timecode" in stream.metadata:
                     continue  # timecode is written anew
-                if stream.type == "audio" and _fits(stream, extension):
+                if stream.type == "audio" and context is not None and _fits(stream, extension):
                     streams.append(stream.index)
                     if _encoded(stream, extension):
                         notes.append("sound in PCM becomes AAC in .mp4; .mov keeps it as it is")
                 elif stream.type == "audio":
-                    name = stream.codec_context.name
+                    name = "an unknown codec" if context is None else context.name
                     notes.append(f"sound in {name} is not copied: .{extension} cannot hold it")
                 else:
                     notes.append(f"a stream of {stream.type} is not copied")

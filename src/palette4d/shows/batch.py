@@ -20,7 +20,7 @@ from palette4d.analysis import pipeline
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.colour.ocio_config import files_of_config
 from palette4d.common.errors import Arg, Palette4dError, in_words
-from palette4d.common.files import make_folder, names_a_server
+from palette4d.common.files import beside, make_folder, names_a_server
 from palette4d.common.text import counted, some_of
 from palette4d.grade import reanalysis, sidecar
 from palette4d.jobs.workers import Failed, Workers
@@ -283,7 +283,7 @@ class Show:
         """Return a path relative to the folder, so that both may move together."""
         if not clip or Path(clip).is_absolute():
             return clip
-        return Path(os.path.relpath(clip, self.folder.absolute())).as_posix()
+        return beside(Path(clip), self.folder)
 
     def take(self, name: str, outcome: Analysed | Failed) -> None:
         """Write a sidecar, or record the failure."""

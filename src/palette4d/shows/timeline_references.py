@@ -7,7 +7,6 @@ sidecar. The rest of the file does not change. docs/files.md explains the member
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any
 
 from palette4d import _core
 from palette4d.common.errors import Arg, Palette4dError
-from palette4d.common.files import names_a_server, refuse_existing, replacing
+from palette4d.common.files import beside, names_a_server, refuse_existing, replacing
 from palette4d.common.json_files import read_regular
 from palette4d.lut_export.series import Series
 from palette4d.shows import timeline_files
@@ -92,7 +91,7 @@ def write(
     _metadata(timeline)[NAMESPACE] = {
         "version": VERSION,
         "generator": f"palette4d {_core.__version__}",
-        "manifest": _seen_from(folder, manifest_path),
+        "manifest": beside(manifest_path, folder),
     }
     text = json.dumps(document, indent=4, ensure_ascii=False) + "\n"
     # The result must be a readable timeline.
@@ -158,23 +157,16 @@ def _references(entry: Entry, shots: Path, series: Series | None, folder: Path) 
     references: dict[str, Any] = {
         "version": VERSION,
         "shot": entry.shot.name,
-        "sidecar": _seen_from(folder, shots / entry.sidecar),
+        "sidecar": beside(shots / entry.sidecar, folder),
         "frames": list(entry.frames),
         "used": list(entry.shot.used),
     }
     if series is not None:
         listed = {*series.baked, *series.kept}
-        references["series"] = _seen_from(folder, series.index)
+        references["series"] = beside(series.index, folder)
         references["luts"] = [
-            {"frame": row["frame"], "file": _seen_from(folder, series.index.parent / row["file"])}
+            {"frame": row["frame"], "file": beside(series.index.parent / row["file"], folder)}
             for row in series.document["frames"]
             if row["frame"] in listed
         ]
     return references
-
-
-def _seen_from(folder: Path, file: Path) -> str:
-    try:
-        return Path(os.path.relpath(file.absolute(), folder)).as_posix()
-    except ValueError:  # on another drive
-        return file.absolute().as_posix()
