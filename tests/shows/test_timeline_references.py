@@ -16,6 +16,7 @@ import pytest
 from edits import clip, dissolve, external, gap, movie, save, timeline
 
 from palette4d.cli import main
+from palette4d.shows import timeline_references
 
 #: A palette that does not change: these tests are about timelines.
 QUICK = ("--method", "static", "--set", "colours=512", "--set", "coarse_colours=128")
@@ -102,6 +103,24 @@ class TestReferences:
         assert two["shot"] == "two"
         assert "palette4d" not in found.tracks[0][4].metadata
         assert found.metadata["palette4d"]["manifest"] == "shots/edit.shots.json"
+
+    def test_all_is_of_the_manifest_that_was_read(
+        self, show: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """`analyze` replaces it after each shot."""
+        check = timeline_references.check
+
+        def analyse_on(*arguments: Any) -> Any:
+            document = json.loads(show.read_text("utf-8"))
+            document["shots"][0] = {**document["shots"][0], "status": "to do"}
+            show.write_text(json.dumps(document), "utf-8")
+            return check(*arguments)
+
+        monkeypatch.setattr(timeline_references, "check", analyse_on)
+        assert export(show, "-o", "luts", "--otio", "graded.otio") == 0
+        for name in ("one", "two"):
+            index = json.loads(Path(f"luts/{name}/{name}.series.json").read_text("utf-8"))
+            assert index["sidecar"]["file"] == f"{name}.p4d.json"
 
     def test_nothing_else_changes(self, show: Path, tmp_path: Path) -> None:
         source = tmp_path / "edit.otio"

@@ -149,7 +149,7 @@ def export(
                     f"{path}: its shots are those of {edit.name}; {Arg('edl')} expects those of an "
                     f"EDL, use {Arg('otio')}"
                 )
-        files, notes = sidecars([path])
+        files, notes = _sidecars_of(path, manifest)
         requests = [
             replace(request, sidecar=file, folder=folder / shot, name=shot)
             for file, shot in zip(files, _done(manifest), strict=True)
@@ -273,14 +273,21 @@ def sidecars(paths: Iterable[Path]) -> tuple[list[Path], list[str]]:
         if not manifests.is_manifest(path):
             files.append(path)
             continue
-        done, others = manifests.sidecars(path)
+        done, left_out = _sidecars_of(path)
         files += done
-        if others:
-            notes.append(
-                f"{path}: {counted(len(others), 'shot')} not analysed and left out: "
-                f"{some_of(others)}"
-            )
+        notes += left_out
     return files, notes
+
+
+def _sidecars_of(
+    path: Path, manifest: manifests.Manifest | None = None
+) -> tuple[list[Path], list[str]]:
+    """Return the sidecars of a manifest, and a note on shots without one."""
+    done, others = manifests.sidecars(path, manifest)
+    if not others:
+        return done, []
+    left_out = f"{counted(len(others), 'shot')} not analysed and left out: {some_of(others)}"
+    return done, [f"{path}: {left_out}"]
 
 
 def _file(source: Source) -> Path:

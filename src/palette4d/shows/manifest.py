@@ -243,9 +243,12 @@ def _rate(numerator: Any, denominator: Any) -> Fraction:
     return rate
 
 
-def sidecars(path: Path) -> tuple[list[Path], list[str]]:
-    """Return the sidecars of a show's finished shots, and the names of the other shots."""
-    manifest = read(path)
+def sidecars(path: Path, manifest: Manifest | None = None) -> tuple[list[Path], list[str]]:
+    """Return the sidecars of a show's finished shots, and the names of the other shots.
+
+    `manifest` is what was read already.
+    """
+    manifest = manifest or read(path)
     done = [path.parent / e.sidecar for e in manifest.entries if e.status == DONE]
     others = [e.shot.name for e in manifest.entries if e.status != DONE]
     if gone := [file.name for file in done if not file.exists()]:
