@@ -244,7 +244,10 @@ std::string refused_target(const std::string& sidecar) {
     const std::string name = path.filename().u8string(), ending = ".json";
     const bool json = name.size() > ending.size() &&
                       name.compare(name.size() - ending.size(), ending.size(), ending) == 0;
-    if (json && name[0] != '.' && folder.filename().u8string().rfind('.', 0) != 0) return "";
+    const bool hidden = std::any_of(folder.begin(), folder.end(), [](const fs::path& part) {
+        return part.u8string().rfind('.', 0) == 0;
+    });
+    if (json && name[0] != '.' && !hidden) return "";
     return sidecar + ": expected a name such as shot.p4d.json, in a folder that is not hidden; " +
            "enter another path";
 }

@@ -176,6 +176,9 @@ TEST(a_fetch_that_cannot_be_says_why) {
     refused("\\u001b[2J");
     effect.node->set("sidecar", (folder() / ".bash_profile").u8string());
     refused("expected a name such as shot.p4d.json");
+    fs::create_directories(folder() / ".config" / "below");
+    effect.node->set("sidecar", (folder() / ".config" / "below" / "shot.p4d.json").u8string());
+    refused("in a folder that is not hidden");
     CHECK(effect.asked.empty());
     effect.node->set("sidecar", effect.target.u8string());
     effect.pictures.pop_back();
