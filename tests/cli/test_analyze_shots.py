@@ -346,6 +346,30 @@ class TestAgain:
         assert "the grade was copied" in done.stdout + done.stderr
         assert Document.load(path).grade.pick("p1").matte
 
+    def test_a_sidecar_that_cannot_be_replaced_costs_its_shot_alone(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        take = external(str(movie(tmp_path / "take.mov", 30)))
+        items = [clip("A", take, 2, 4), clip("B", take, 12, 4), clip("C", take, 22, 4)]
+        path, out = save(timeline(*items), tmp_path / "edit.otio"), tmp_path / "shots"
+        assert analyze(path, out) == 0
+        (out / "B.p4d.json").unlink()
+        (out / "B.p4d.json").mkdir()
+        (out / "C.p4d.json").unlink()
+        for words in ((), ("--keep-edits",), ("--drop-edits",)):
+            assert analyze(path, out, *words) == 1
+            assert [status for _, status, _ in shots(out)] == ["done", "failed", "done"]
+            assert "would lose" not in capsys.readouterr().err
+            (out / "C.p4d.json").unlink()
+        (out / "B.p4d.json").rmdir()
+        assert analyze(path, out) == 0
+        # What may hold edits stops the command before it begins.
+        (out / "B.p4d.json").write_text("broken")
+        (out / "C.p4d.json").unlink()
+        assert analyze(path, out) == 1
+        assert "would lose: B" in capsys.readouterr().err
+        assert not (out / "C.p4d.json").exists()
+
     def test_shots_that_are_not_named_follow_a_new_edit(self, tmp_path: Path) -> None:
         take = external(str(movie(tmp_path / "take.mov", 30)))
         out = tmp_path / "shots"

@@ -35,6 +35,7 @@ from without_module import run_without
 from palette4d.common.errors import Palette4dError
 from palette4d.shows import timeline_clips, timeline_files
 from palette4d.shows import timeline_shots as timelines
+from palette4d.shows.analysis import analyze_shots
 from palette4d.shows.find_media import Folder
 from palette4d.shows.shots import numbered as unlike
 
@@ -408,6 +409,9 @@ class TestFiles:
         otio.adapters.write_to_file(made, str(path), media_policy="AllMissing")
         found = found_in(path, plates)
         assert [(s.first, s.last) for s in found.shots] == [(5, 14)]
+        quick = {"method": "static", "colours": 512, "coarse_colours": 128, "jobs": 1}
+        show = analyze_shots(path, tmp_path / "shots", media=plates, **quick)
+        assert [entry.status for entry in show.manifest.entries] == ["done"]
 
     @pytest.mark.parametrize(
         ("text", "words"),

@@ -551,7 +551,12 @@ def _window(document: Document, pick: Pick, followed: bool) -> list[str]:
             why = ": it reaches across the picture"
         lines[0] += "; not followed" + why * (followed and low < high)
     else:
-        moves = max(math.dist(key.box[:2], given[0].box[:2]) for key in window.keys)
+        # A box that ends at the picture's edge has more room there: the other side counts.
+        steps = [
+            [abs(side - own) for side, own in zip(key.box, given[0].box, strict=True)]
+            for key in window.keys
+        ]
+        moves = max(math.hypot(min(step[::2]), min(step[1::2])) for step in steps)
         lines[0] += f"; followed, and moves by up to {moves:.0f} pixels"
     lost = pick.lost(document.grade.frames)
     for frame, words in zip(lost, ("until", "from"), strict=True):

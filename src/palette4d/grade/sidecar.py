@@ -27,6 +27,10 @@ SCHEMA = "palette4d.sidecar"
 _HISTORY = ("version", "history", "mattes")
 
 
+class WouldLoseEdits(Palette4dError):
+    """A file holds edits, or may hold some, that a save would lose."""
+
+
 def new_document(
     clip: Mapping[str, Any],
     polytope: Mapping[str, Any],
@@ -214,7 +218,7 @@ def existing(target: Path, on_edits: OnEdits) -> Saved | None:
     except FileNotFoundError:
         return None
     except Palette4dError as error:
-        raise Palette4dError(
+        raise WouldLoseEdits(
             f"{target} exists and cannot be read as a sidecar ({error}); it may hold edits. "
             f"Move it away, choose another output, or replace it with {Arg('on_edits', 'drop')}"
         ) from error
@@ -240,8 +244,8 @@ def _summary(document: Fields) -> str:
     return f"{vertices}, {stops}, {picks}, {versions}"
 
 
-def _would_lose(target: Path, old: Fields) -> Palette4dError:
-    return Palette4dError(
+def _would_lose(target: Path, old: Fields) -> WouldLoseEdits:
+    return WouldLoseEdits(
         f"{target} holds edits ({_summary(old)}) that this would lose. "
         f"Keep them with {Arg('on_edits', 'keep')} (a changed palette gets a copy of the grade), "
         f"discard them with {Arg('on_edits', 'drop')}, or choose another output"

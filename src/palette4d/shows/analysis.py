@@ -141,7 +141,8 @@ def _of_timeline(
     conform: Conform | None,
 ) -> tuple[Source, list[Shot], list[str]]:
     """Return a timeline, its shots, and notes."""
-    sha256 = timeline_files.sha256(path) if path.is_file() else ""  # the reader says why not
+    there = path.is_file() or (path / "content.otio").is_file()
+    sha256 = timeline_files.sha256(path) if there else ""  # the reader says why not
     timeline = timeline_clips.read(path, rate)
     if timeline_files.sha256(path) != sha256:
         raise Palette4dError(f"{path}: it was changed while it was read; run the command again")

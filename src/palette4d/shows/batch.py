@@ -199,13 +199,19 @@ class Show:
         elif not self.options.force and (frames := self.there(own, before)) is not None:
             entry = dataclasses.replace(entry, status=DONE, frames=frames)
             self.kept.append(shot.name)
-            _tell_edit(self.folder / entry.sidecar, own, frames)
+            try:
+                _tell_edit(self.folder / entry.sidecar, own, frames)
+            except Palette4dError as error:
+                words = error.message.marked
+                self.notes[shot.name] = (f"it does not say how the edit plays it: {words}",)
         elif chosen:
             try:
                 self.tasks[shot.name] = self.task(shot, entry)
                 self.check_target(entry, before)
             except Palette4dError as error:
-                if self.tasks.pop(shot.name, None) and before is not None and before.status == DONE:
+                self.tasks.pop(shot.name, None)
+                was_done = before is not None and before.status == DONE
+                if isinstance(error, sidecar.WouldLoseEdits) and was_done:
                     self.graded.append(shot.name)
                 entry = dataclasses.replace(entry, status=FAILED, error=error.message.marked)
         self.entries[shot.name] = entry
