@@ -175,8 +175,8 @@ def analyze(
     if (farthest := float(max(-gamut.low.min(), gamut.high.max()))) > LARGEST_VALUE:
         raise Palette4dError(
             f"{clip.source}: found code values up to {farthest:.3g} in more than single pixels, "
-            f"expected colours, of at most {LARGEST_VALUE:,}; choose another layer with "
-            f"{Arg('layer')}, or convert the clip"
+            f"expected colours, of at most {LARGEST_VALUE:,}; choose another layer of it, or "
+            "convert it"
         )
     if starts := cuts.find_cuts((frame.frame, frame.histogram) for frame in usable):
         if not allow_cuts:

@@ -14,7 +14,7 @@ from palette4d.lut_export.clip_picks import PickConstants, pick_constants
 from palette4d.lut_export.frame_edit import check_frame
 
 from palette4d import _core
-from palette4d.common.arguments import parse_frames
+from palette4d.common.arguments import frames_between, parse_frames
 from palette4d.common.errors import Arg, Palette4dError
 
 F64 = NDArray[np.float64]
@@ -211,11 +211,11 @@ def _frames(sidecar: _core.Sidecar, frames: str | None) -> list[float]:
     polytope = sidecar.polytope
     first, last = polytope.first_frame, polytope.last_frame
     if frames is None:
-        return [float(frame) for frame in range(int(first), int(last) + 1)]
+        return [float(frame) for frame in frames_between(int(first), int(last))]
     chosen = sorted(parse_frames(frames))
     for frame in (chosen[0], chosen[-1]):
         check_frame(sidecar, frame)
-    return [float(frame) for frame in range(chosen[0], chosen[-1] + 1)]
+    return [float(frame) for frame in frames_between(chosen[0], chosen[-1])]
 
 
 def _state(sidecar: _core.Sidecar, frame: float) -> _State:

@@ -302,7 +302,7 @@ class _Export:
             check_settings(settings, format_, sidecar, frame)
         name = checked_name(request.name) if request.name else file_safe(sidecar.clip["name"])
         self.index = request.folder / f"{name}.series.json"
-        self.header = header_of(sidecar, self.file.name, read.data, settings)
+        self.header = header_of(sidecar, self.file.name, read.data, settings, request.clip)
         known = read_index(self.index, self.header, request.force)
         names = {f: file_name(name, f, request.padding, format_.extension) for f in frames}
         self.kept = [

@@ -30,14 +30,17 @@ _CHANGED = {
 
 
 def header_of(
-    sidecar: _core.Sidecar, name: str, data: bytes, settings: BakeSettings
+    sidecar: _core.Sidecar, name: str, data: bytes, settings: BakeSettings, given: str | None
 ) -> dict[str, Any]:
     """Return the index members for all files: the sidecar's file, its bytes, and the settings.
 
-    A config may change under its name, so that its conversion counts.
+    `given` is the clip, if it is not the sidecar's. A config may change under its name, so that its
+    conversion counts.
     """
     clip = sidecar.clip
     options = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(settings).items()}
+    if given is not None:
+        options["clip"] = given
     if settings.space not in (INPUT, PALETTE):
         steps = space_of(data, sidecar, settings.space, settings.ocio_config).steps
         options["conversion"] = hashlib.sha256(json.dumps(steps).encode()).hexdigest()

@@ -1,6 +1,7 @@
 """Names from files do not act on the terminal, whichever verb prints them."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -120,3 +121,15 @@ def test_a_fault_of_the_program_does_not_let_a_name_through() -> None:
     assert done.returncode == 1
     assert "RuntimeError: a name \\u001b]0;owned\\u0007" in done.stderr
     assert "\x1b" not in done.stderr
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "ascii"])
+def test_a_terminal_that_lacks_characters_shows_their_numbers(encoding: str) -> None:
+    golden = str(EDITED)
+    done = subprocess.run(
+        [sys.executable, "-m", "palette4d", "info", golden],
+        env={**os.environ, "PYTHONIOENCODING": encoding},
+        capture_output=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert b"\\u" in done.stdout

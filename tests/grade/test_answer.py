@@ -122,6 +122,32 @@ def test_beside_a_small_thing_small_areas_are_named(
     assert (note(found, "its colour elsewhere") is not None) == told
 
 
+def test_what_touches_within_a_window_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = RED
+    picture[30:90, 60:150] = RUST
+    document = document_of(monkeypatch, picture)
+    document.pick(0, pixel=(40.0, 60.0), box=9, to="#2040b0", reach=8, window=(10, 20, 80, 100))
+    told = note(again(document), "touches it")
+    assert told is not None
+    assert told.place is not None
+    assert 60 <= told.place.pixel[0] < 80 + 14
+    document.set_window("p1", 0, (10, 20, 56, 100), feather=0)
+    assert note(again(document), "touches it") is None
+
+
+def test_a_frame_that_a_correction_floods_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    picture = np.tile((0.15, 0.25, 0.6), (H, W, 1))
+    picture[50:60, 80:95] = RED
+    document = document_of(monkeypatch, picture, frames=5)
+    document.pick(0, pixel=(87.0, 55.0), box=5, to="#20b040")
+    assert note(again(document), "of frame") is None
+    document.correct_path("p1", 4, pixel=(20.0, 20.0), box=5)  # beside the thing
+    told = note(again(document), "of frame 4: correct p1 there")
+    assert told is not None
+    assert told.warns
+
+
 def test_a_larger_thing_that_touches_is_warned_of(monkeypatch: pytest.MonkeyPatch) -> None:
     document = document_of(monkeypatch, touching())
     document.pick(0, pixel=(95.0, 45.0), box=9, to="#2040b0", reach=2)

@@ -434,7 +434,7 @@ def test_a_new_document_is_saved_beside_its_clip(
     fields = sidecar.load(GOLDEN / "v1_split.p4d.json")
     fields["clip"]["source"] = "plates/shot.####.exr"
     document = Document(fields)
-    with pytest.raises(Palette4dError):
+    with pytest.raises(Palette4dError, match="no file yet"):
         document.save()
     document.save("grades/clip.p4d.json")
     saved = sidecar.load("grades/clip.p4d.json")

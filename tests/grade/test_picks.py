@@ -12,7 +12,7 @@ import palette4d
 from palette4d.common.errors import Palette4dError, SidecarError
 from palette4d.grade import later, mattes, pick_edits, rendering, sidecar
 from palette4d.grade.clip_colours import ClipColours
-from palette4d.grade.clip_of_picks import ClipOfPicks
+from palette4d.grade.clip_of_picks import ClipOfPicks, largest_part
 from palette4d.grade.document import Document
 from palette4d.grade.later import with_readings
 from palette4d.grade.picks import MOST_AREAS, MOST_PICKS, Area, PathKey, Pick, Window, WindowKey
@@ -109,6 +109,18 @@ def test_a_window_that_was_followed_meanwhile_keeps_its_feather() -> None:
         assert with_readings({("pick", "p1"): own}, readings) == {
             ("pick", "p1"): replace(own, matte="m1", window=expected)
         }
+
+
+@pytest.mark.parametrize(("side", "box"), [(1, 1), (5, 5), (9, 9), (40, 15)])
+def test_the_middle_of_the_largest_part(side: int, box: int) -> None:
+    mask = np.zeros((60, 80), bool)
+    mask[10 : 10 + side, 20 : 20 + side] = True
+    mask[58:60, 70:79] = side > 5  # larger than a pixel, not as deep
+    part, middle, size = largest_part(mask)
+    assert part.sum() == side**2
+    assert size == box
+    if side % 2:
+        assert middle == (20 + side // 2, 10 + side // 2)
 
 
 def test_another_pixel_without_a_box_is_that_pixel(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import ctypes
 import json
 import subprocess
@@ -262,6 +263,14 @@ def test_what_a_dctl_cannot_hold_is_refused(
     document = DOCUMENTS["changes-smooth"]
     with pytest.raises(Palette4dError, match=r"outside the clip"):
         exported(document, tmp_path, frames="12-400")
+    fields = copy.deepcopy(document)
+    ends = {fields["clip"]["frames"][end]: far for end, far in (("first", -1e9), ("last", 1e9))}
+    polytope, frames = fields["polytope"], fields["clip"]["frames"]
+    for owner in (frames, *polytope["vertices"], *polytope["blocks"]):
+        for name in owner.keys() & {"first", "last", "frame"}:
+            owner[name] = ends.get(owner[name], owner[name])
+    with pytest.raises(Palette4dError, match=r"more than 1000000 frames"):
+        exported(fields, tmp_path)
     monkeypatch.setattr(clip_text, "MOST_BYTES", 1000)
     with pytest.raises(Palette4dError, match=r"room for 0 KB.*frames="):
         exported(document, tmp_path)

@@ -233,6 +233,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"wrote {args.output}: {colours} through time, {handles}")
         out = quoted(args.output)
         print(f"next: palette4d plot {out} -o palette.png")
+        first = document.grade.frames[0]
+        print(f"      palette4d edit {out} pick --frame {first} --pixel X,Y --to '#rrggbb'")
         if args.like is not None and load(args.like).grade.edited and not document.grade.edited:
             print(f"      palette4d edit {out} copy {quoted(args.like)}")
     return 0

@@ -111,6 +111,7 @@ def info_of(document: "Document") -> dict[str, Any]:
         "edited_vertices": len(edited),
         "ramp": document.grade.ramp,
         "picks": len(fields["edits"].get("picks", [])),
+        "holds": sum(pick["kind"] == "hold" for pick in fields["edits"].get("picks", [])),
         "windows": sum("window" in pick for pick in fields["edits"].get("picks", [])),
         "edit": fields["extra"].get("edit"),
         "locks": fields["edits"].get("locks", []),
@@ -252,7 +253,8 @@ def _print_head(info: dict[str, Any]) -> None:
     print(
         f"edits     {counted(info['edited_vertices'], 'vertex', 'vertices')}, "
         f"{counted(info['stops'], 'stop')}"
-        + (f", {counted(info['picks'], 'pick')}" if info["picks"] else "")
+        + (f", {counted(info['picks'] - info['holds'], 'pick')}" if info["picks"] else "")
+        + (f", {counted(info['holds'], 'hold')}" if info["holds"] else "")
         + (f" ({counted(info['windows'], 'window')})" if info["windows"] else "")
         + (f", {counted(len(info['locks']), 'lock')}" if info["locks"] else "")
         + (f", {RAMP_WORDS[info['ramp']]} ramps" if info["ramp"] != "linear" else "")

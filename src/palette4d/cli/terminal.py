@@ -49,9 +49,10 @@ def unfiltered_stderr() -> TextIO:
 def printable_output() -> Iterator[None]:
     """Make standard output and standard error printable in the body (`common.text.printable`)."""
     for stream in (sys.stdout, sys.stderr):
-        # Files and pipes have the code page of Windows, which lacks most characters.
-        if sys.platform == "win32" and isinstance(stream, io.TextIOWrapper):
-            encoding = stream.encoding if stream.isatty() else "utf-8"
+        if isinstance(stream, io.TextIOWrapper):
+            # Files and pipes have the code page of Windows, which lacks most characters.
+            page = sys.platform == "win32" and not stream.isatty()
+            encoding = "utf-8" if page else stream.encoding
             stream.reconfigure(encoding=encoding, errors="backslashreplace")
     # Windows' pythonw, which starts the window without a console, has neither.
     unseen = io.StringIO()

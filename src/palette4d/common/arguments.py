@@ -188,10 +188,12 @@ class ColourAction(argparse.Action):
         """Store the colour; exit with status 2 if the words are not a colour."""
         colour = parse_colour(values)
         if colour is None:
+            # The last word may be the id, which the option has taken.
+            order = "" if parse_colour(values[:-1]) is None else ", with the id before the option"
             raise argparse.ArgumentError(
                 self,
                 f"found {' '.join(values)!r}, expected three finite numbers (R G B or R,G,B) or "
-                "#rrggbb, with the id before the option",
+                f"#rrggbb{order}",
             )
         setattr(namespace, self.dest, colour)
 

@@ -20,6 +20,7 @@ from palette4d.grade import pick_edits, thing
 from palette4d.grade.clip_of_picks import SAME_COLOUR, ClipOfPicks, largest_part
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.grade import Grade
+from palette4d.grade.mattes import further_frames
 from palette4d.grade.pick_edits import When
 from palette4d.grade.picks import ALIKE, Area, Box, Pick, as_box
 from palette4d.media.source_clip import nearest_frame
@@ -146,6 +147,7 @@ def answer_to(grade: Grade, pick: Pick, clip: ClipOfPicks) -> Answer | None:
             notes += _cost(view, it, hold, pick_edits.unpick(grade, clip, hold.id)) or ()
         notes += _shared(view, pick, [other for other in picks if other.id != pick.id])
         notes += _also(it)
+        notes += _elsewhen(view, pick)
     kind: Literal["pick", "hold"] = "hold" if pick.kind == "hold" else "pick"
     return Answer(view.frame, float(view.change(pick).mean()), tuple(notes), kind)
 
@@ -233,7 +235,9 @@ class _View:
         rgb = as_colour(np.median(self.rgb[largest], axis=0).tolist())
         return Place(self.frame, pixel, box * self.every, rgb)
 
-    def after(self, pick: Pick, gesture: Literal["hold", "area"], place: Place) -> F32 | None:
+    def after(
+        self, pick: Pick, gesture: Literal["hold", "area"], place: Place, *, windowed: bool = True
+    ) -> F32 | None:
         """Return a pick's change after a gesture at a place; None if the gesture is refused."""
         try:
             if gesture == "hold":
@@ -244,7 +248,7 @@ class _View:
                 trial = pick_edits.add_area(self.grade, self.clip, pick.id, area)
         except Palette4dError:
             return None
-        return self.under(trial).change(pick)
+        return self.under(trial).change(pick, windowed=windowed)
 
     def around(self, mask: B) -> Box:
         """Return the box around the pixels of a mask, with as much room as its feather."""
@@ -269,9 +273,10 @@ class _View:
 class _Thing:
     """A pick's thing in the frame that it was picked in, as it is without holds.
 
-    `own` is the thing, `beside` what is connected with it and is another thing, `joined` the part
-    of that where it was noticed; `away` says how unlike the marks each pixel is. `free` is the
-    grade without holds.
+    What is outside the pick's window shows where the thing ends, and does not count. `own` is the
+    thing, `beside` what is connected with it and is another thing, `joined` the part of that where
+    it was noticed; `away` says how unlike the marks each pixel is. `free` is the grade without
+    holds.
     """
 
     view: _View
@@ -287,17 +292,18 @@ class _Thing:
     def of(cls, view: _View, pick: Pick, holds: Sequence[Pick]) -> _Thing:
         grade = pick_edits.unpick(view.grade, view.clip, *(hold.id for hold in holds))
         free, marks, none = view.under(grade), view.marks(pick.marks), np.zeros_like(view.real)
-        before = free.change(pick)
-        taken = before > TAKEN
+        before = free.change(pick, windowed=False)
+        taken, here = before > TAKEN, free.change(pick) > TAKEN
         if not marks:
-            return cls(view, grade, pick, marks, taken, none, none, None)
+            return cls(view, grade, pick, marks, here, none, none, None)
         marked, away = view.any_of(marks), thing.unlike(view.points(view.rgb), marks)
         whole = thing.connected(taken, marked, gap=4)
         for own, part in thing.joins(taken, marked, away, SAME_COLOUR, int(OTHERS * taken.size)):
-            after = free.after(pick, "hold", view.place(part))
+            after = free.after(pick, "hold", view.place(part), windowed=False)
             if after is not None and _parted(before, after, part, own):
-                return cls(view, grade, pick, marks, own, whole & ~own, part, away)
-        return cls(view, grade, pick, marks, whole, none, none, away)
+                own, beside, part = own & here, whole & here & ~own, part & here
+                return cls(view, grade, pick, marks, own, beside, part, away)
+        return cls(view, grade, pick, marks, whole & here, none, none, away)
 
     def side(self, part: B, others: B) -> B:
         """Return what of a part is not nearer to other pixels than to the marks."""
@@ -347,7 +353,7 @@ def _cost(view: _View, it: _Thing, hold: Pick, without: Grade) -> list[Note] | N
     pick, there = it.pick, it.view
     if all((v.under(without).change(pick) - v.change(pick)).max() <= TAKEN for v in (view, there)):
         return None
-    words = f"{hold.id} lies on what you marked for {pick.id}, and costs it {{}}"
+    words = f"{hold.id} costs {pick.id} {{}} of what you marked for it"
     areas = [(area, _View.of(view.grade, view.clip, area.frame)) for area in pick.marks]
     parts = [(words, seen, seen.mark(area)) for area, seen in areas]
     held = there.any_of(there.marks(hold.marks))
@@ -370,6 +376,19 @@ def _cost(view: _View, it: _Thing, hold: Pick, without: Grade) -> list[Note] | N
         words += " (if that belongs to the thing, remove it or hold another place), most of it"
         return [Note(words, place, id=pick.id, warns=True)]
     return []
+
+
+def _elsewhen(view: _View, pick: Pick) -> Iterator[Note]:
+    """Report the frame that a pick floods most, of the marked ones and some more of its range."""
+    clip = view.clip.open()
+    assert clip is not None
+    marked = [nearest_frame(clip, key.frame) for key in pick.path if key.given]
+    frames = {*marked, *further_frames(pick, clip.frames)} - {view.frame}
+    shares = {n: float(_View.of(view.grade, view.clip, n).change(pick).mean()) for n in frames}
+    frame = max(shares, key=lambda n: (shares[n], -n), default=view.frame)
+    if shares.get(frame, 0) > FLOOD > 2 * float(view.change(pick).mean()):
+        words = f"takes {percent(shares[frame])} of frame {frame}: correct {pick.id} there"
+        yield Note(f"{words}, or end it before", id=pick.id, warns=True)
 
 
 def _shared(view: _View, pick: Pick, picks: Sequence[Pick]) -> Iterator[Note]:
@@ -400,8 +419,11 @@ def _also(it: _Thing) -> Iterator[Note]:
     pick, view = it.pick, it.view
     change = left = view.change(pick)
     taken = change > TAKEN
-    odd = ndimage.binary_opening(taken & (view.hue(pick) > HUE), iterations=2)  # without rims
-    beside, elsewhere = (taken & where & ~odd for where in (it.beside, ~(it.own | it.beside)))
+    odd, beside = (
+        ndimage.binary_opening(taken & where, iterations=2)  # without rims
+        for where in (view.hue(pick) > HUE, it.beside)
+    )
+    beside, elsewhere = beside & ~odd, taken & ~(it.own | it.beside | odd)
     flood = bool(change[beside].sum() > change[it.own & ~odd].sum())
     kinds = [
         ("also takes another hue", odd),

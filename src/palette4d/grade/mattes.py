@@ -97,7 +97,7 @@ def learn(
     own, background = _brushes([pick], frames), _brushes(holds, frames)
     first = nearest(frames, pick.frame)
     seeded = dict.fromkeys([first, *(nearest(frames, area.frame) for area in pick.areas)])
-    others = dict.fromkeys([*background, *_along(pick, frames)])
+    others = dict.fromkeys([*background, *further_frames(pick, frames)])
     chosen = [*seeded, *(frame for frame in others if frame not in seeded)]
     image = read(first)
     if len(chosen) > (most := most_frames(image.size)):
@@ -138,7 +138,7 @@ def _brushes(picks: Sequence[Pick], frames: Sequence[int]) -> dict[int, list[Bru
     return found
 
 
-def _along(pick: Pick, frames: Sequence[int]) -> list[int]:
+def further_frames(pick: Pick, frames: Sequence[int]) -> list[int]:
     """Return frames spread over those at which all of the pick is asked for."""
     first = frames[0] if pick.start is None else pick.start
     last = frames[-1] if pick.until is None else pick.until
