@@ -1,6 +1,7 @@
 """Moves of handles, tracks and palettes, over all time and within a range; ramps."""
 
 import itertools
+import re
 import time
 from pathlib import Path
 from typing import Any
