@@ -37,7 +37,7 @@ from palette4d import _core
 from palette4d.colour.ocio_config import files_of_config, from_anywhere
 from palette4d.common.arguments import frames_between
 from palette4d.common.errors import Arg, Palette4dError, WriteError
-from palette4d.common.files import make_folder, replacing, temporary_folder
+from palette4d.common.files import make_folder, replacing, temporary_folder, unwritten
 from palette4d.common.text import checked_name, file_safe
 from palette4d.jobs.workers import Failed, Workers
 from palette4d.media.clip_files import files_of_sidecar
@@ -391,10 +391,13 @@ def _put(target: Path, data: bytes, sidecar: Path, force: bool) -> None:
 
 def _put_for_link(link: Path, data: bytes) -> None:
     """Replace a link atomically by a file."""
-    with temporary_folder(link.parent) as folder:
-        with replacing(folder / link.name) as temporary:
-            temporary.write_bytes(data)
-        (folder / link.name).replace(link)
+    try:
+        with temporary_folder(link.parent) as folder:
+            with replacing(folder / link.name) as temporary:
+                temporary.write_bytes(data)
+            (folder / link.name).replace(link)
+    except OSError as error:
+        raise unwritten(link, error) from error
 
 
 def _matches(path: Path, entry: Entry | None) -> bool:
