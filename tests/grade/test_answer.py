@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,11 +12,12 @@ from numpy.typing import NDArray
 import palette4d
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import percent
-from palette4d.grade.answer import Answer, Note
+from palette4d.grade.answer import Answer, Note, answer_to
+from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.document import Document
-from palette4d.grade.picks import Area
+from palette4d.grade.picks import Area, PathKey
 from palette4d.media.array_clip import ArrayClip
-from palette4d.media.clip_base import Clip
+from palette4d.media.clip_base import Clip, FrameError
 
 H, W = 120, 200
 RED, RUST, GREY = np.array([[0.7, 0.12, 0.15], [0.6, 0.19, 0.14], [0.55, 0.57, 0.6]])
@@ -146,6 +148,45 @@ def test_a_frame_that_a_correction_floods_is_told(monkeypatch: pytest.MonkeyPatc
     told = note(again(document), "of frame 4: correct p1 there")
     assert told is not None
     assert told.warns
+
+
+def test_frames_outside_the_range_and_bad_ones_are_not_looked_at(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    picture = np.tile((0.15, 0.25, 0.6), (H, W, 1))
+    picture[50:60, 80:95] = RED
+    document = document_of(monkeypatch, picture, frames=5)
+    document.pick(0, pixel=(87.0, 55.0), box=5, to="#20b040")
+    document.correct_path("p1", 4, pixel=(20.0, 20.0), box=5)
+    assert note(again(document), "of frame 4") is not None
+    read = ClipOfPicks.read
+
+    def bad(self: ClipOfPicks, frame: int) -> NDArray[np.float32]:
+        if frame == 4:
+            raise FrameError("frame 4 cannot be read")
+        return read(self, frame)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(ClipOfPicks, "read", bad)
+        assert note(again(document), "of frame 4") is None
+    document.change_pick("p1", until=1)
+    assert note(again(document), "of frame") is None
+
+
+@pytest.mark.parametrize("there", [0.0, 0.8])
+def test_following_that_loses_what_stays_is_told(
+    monkeypatch: pytest.MonkeyPatch, there: float
+) -> None:
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = RED
+    document = document_of(monkeypatch, picture, frames=6)
+    pick = document.pick(0, pixel=(40.0, 60.0), box=9, to="#2040b0", follow=False)
+    assert again(document).notes == ()
+    path = (PathKey(0, pick.rgb, True), PathKey(1, pick.rgb, there=there))
+    grade = document.grade.put("pick", "p1", replace(pick, path=path))
+    told = answer_to(grade, grade.pick("p1"), ClipOfPicks.of(grade))
+    assert told is not None
+    assert (note(told, "following loses its colour") is not None) == (there == 0)
 
 
 def test_a_larger_thing_that_touches_is_warned_of(monkeypatch: pytest.MonkeyPatch) -> None:

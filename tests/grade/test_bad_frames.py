@@ -253,6 +253,39 @@ class TestAgain:
         again = render(sidecar, clip, tmp_path / output, skip_existing=True, **NONE)
         assert again.frames == []
 
+    def test_a_frame_that_came_late_takes_the_place_of_what_was_shown(self, tmp_path: Path) -> None:
+        clip = sequence(tmp_path / "in", [1, 2, 4, 6], broken=[5])
+        again: dict = {"skip_existing": True, **NONE}
+        for output in ("o.####.png", "o.mov"):
+            render(PLAIN, clip, tmp_path / output, **NONE)
+            assert render(PLAIN, clip, tmp_path / output, **again).frames == []
+        assert levels(tmp_path / "o.####.png")[3] == 20
+        frames = tmp_path / "o.####.png"
+        assert render(PLAIN, clip, frames, missing="black", **again).frames == [3, 5]
+        assert render(PLAIN, clip, frames, **again).frames == [3, 5]
+        sequence(tmp_path / "in", [3])
+        assert render(PLAIN, clip, frames, **again).frames == [3]
+        assert render(PLAIN, clip, tmp_path / "o.mov", **again).frames == [1, 2, 3, 4, 5, 6]
+        sequence(tmp_path / "in", [5])
+        assert render(PLAIN, clip, frames, **again).frames == [5]
+        assert render(PLAIN, clip, frames, **again).frames == []
+        assert levels(frames) == {1: 10, 2: 20, 3: 30, 4: 40, 5: 50, 6: 60}
+
+    def test_a_movie_of_other_frames_is_another(self, tmp_path: Path) -> None:
+        clip, out = sequence(tmp_path / "in", [1, 2, 3, 4]), tmp_path / "o.mov"
+        render(PLAIN, clip, out, frames="1-2", **NONE)
+        assert render(PLAIN, clip, out, frames="3-4", skip_existing=True, **NONE).frames == [3, 4]
+
+    def test_another_layer_is_another_picture(self, tmp_path: Path) -> None:
+        names = ("R", "G", "B", "spec.R", "spec.G", "spec.B")
+        pixels = np.repeat(np.float32([0.2, 0.6]), 3) * np.ones((16, 24, 1), np.float32)
+        write_image(tmp_path / "c.0001.exr", pixels, names=names)
+        clip, out = str(tmp_path / "c.0001.exr"), tmp_path / "o.####.png"
+        render(PLAIN, clip, out, **NONE)
+        spec = f"{clip}?layer=spec"
+        assert render(PLAIN, spec, out, skip_existing=True, **NONE).frames == [1]
+        assert levels(out) == {1: 153}
+
     def test_a_movie_stays_if_it_is_whole(
         self, tmp_path: Path, capsys: pytest.CaptureFixture
     ) -> None:

@@ -6,6 +6,7 @@ been tried on the frame.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -23,6 +24,7 @@ from palette4d.grade.grade import Grade
 from palette4d.grade.mattes import further_frames
 from palette4d.grade.pick_edits import When
 from palette4d.grade.picks import ALIKE, Area, Box, Pick, as_box
+from palette4d.media.clip_base import FrameError
 from palette4d.media.source_clip import nearest_frame
 
 F32 = NDArray[np.float32]
@@ -124,7 +126,7 @@ def answer_to(grade: Grade, pick: Pick, clip: ClipOfPicks) -> Answer | None:
     if clip.open() is None:
         return None
     # A range may leave the frame of the pick out: what it takes is the same.
-    pick = replace(pick, start=None, until=None)
+    ranged, pick = pick, replace(pick, start=None, until=None)
     grade = grade.put("pick", pick.id, pick)
     view = _View.of(grade, clip, pick.frame)
     picks = [other for other in grade.picks if other.enabled and other.kind == "pick"]
@@ -147,7 +149,7 @@ def answer_to(grade: Grade, pick: Pick, clip: ClipOfPicks) -> Answer | None:
             notes += _cost(view, it, hold, pick_edits.unpick(grade, clip, hold.id)) or ()
         notes += _shared(view, pick, [other for other in picks if other.id != pick.id])
         notes += _also(it)
-        notes += _elsewhen(view, pick)
+        notes += _elsewhen(view, pick, ranged)
     kind: Literal["pick", "hold"] = "hold" if pick.kind == "hold" else "pick"
     return Answer(view.frame, float(view.change(pick).mean()), tuple(notes), kind)
 
@@ -378,17 +380,38 @@ def _cost(view: _View, it: _Thing, hold: Pick, without: Grade) -> list[Note] | N
     return []
 
 
-def _elsewhen(view: _View, pick: Pick) -> Iterator[Note]:
-    """Report the frame that a pick floods most, of the marked ones and some more of its range."""
+def _elsewhen(view: _View, pick: Pick, ranged: Pick) -> Iterator[Note]:
+    """Report a frame that the pick floods, and one where following loses what it takes.
+
+    Looked at are frames where the user corrected the pick, and some more: those of its range,
+    which `ranged` has.
+    """
     clip = view.clip.open()
     assert clip is not None
-    marked = [nearest_frame(clip, key.frame) for key in pick.path if key.given]
-    frames = {*marked, *further_frames(pick, clip.frames)} - {view.frame}
-    shares = {n: float(_View.of(view.grade, view.clip, n).change(pick).mean()) for n in frames}
-    frame = max(shares, key=lambda n: (shares[n], -n), default=view.frame)
-    if shares.get(frame, 0) > FLOOD > 2 * float(view.change(pick).mean()):
-        words = f"takes {percent(shares[frame])} of frame {frame}: correct {pick.id} there"
+    corrected = [nearest_frame(clip, key.frame) for key in pick.path if key.given]
+    unfollowed = replace(ranged, path=())
+    inside = {n for n in corrected if unfollowed.strength_at(n, 1.0) > 0.5}
+    views = []
+    for frame in sorted({*inside, *further_frames(unfollowed, clip.frames)} - {view.frame}):
+        with contextlib.suppress(FrameError):
+            views.append(_View.of(view.grade, view.clip, frame))
+    shares = [float(there.change(pick).mean()) for there in views]
+    here = float(view.change(pick).mean())
+    frames = [there.frame for there in views]
+    most, frame = max(zip(shares, frames, strict=True), default=(0.0, view.frame))
+    if most > FLOOD > 2 * here:
+        words = f"takes {percent(most)} of frame {frame}: correct {pick.id} there"
         yield Note(f"{words}, or end it before", id=pick.id, warns=True)
+    if not pick.path:
+        return
+    still = view.grade.put("pick", pick.id, replace(pick, path=()))
+    for there, share in zip(views, shares, strict=True):
+        without = float(there.under(still).change(pick).mean())
+        if without > max(2 * share, here / 2):
+            words = f"following loses its colour: takes {percent(share)} of frame {there.frame}"
+            words += f", {percent(without)} if {pick.id} is not followed"
+            yield Note(words, id=pick.id, warns=True)
+            return
 
 
 def _shared(view: _View, pick: Pick, picks: Sequence[Pick]) -> Iterator[Note]:

@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -140,7 +140,7 @@ class Painter:
     """Draws a clip's frames, and pictures for bad frames.
 
     `missing` says what a bad frame shows; "leave out": nothing. `filled` are the bad frames that
-    show something, so far.
+    show something, so far, and what.
     """
 
     document: Document
@@ -150,7 +150,7 @@ class Painter:
     space: Literal["input", "palette"] = "input"
     threads: int = 0
     missing: Missing | Literal["leave out"] = "error"
-    filled: list[int] = field(default_factory=list)
+    filled: dict[int, str] = field(default_factory=dict)
     _last: tuple[Image, F32] | None = field(default=None, init=False)
 
     def paint(self, frame: int) -> tuple[Image, F32] | None:
@@ -159,7 +159,7 @@ class Painter:
         if painted is not None or self.missing == "leave out":
             return painted
         image, pixels = self._nearest(frame)
-        self.filled.append(frame)
+        self.filled[frame] = self.missing
         if self.missing == "black":
             pixels = np.zeros_like(pixels)
         rate = rate_of(self.clip, self.document)
@@ -307,7 +307,7 @@ def render(
     movie = is_movie(Path(output))
     clip, fill = opened_for_render(clip, frames, missing, skip_bad_frames, movie=movie)
     size = clip.width * (2 if compare == "side" else 1), clip.height
-    todo = clip.frames
+    todo, filled = clip.frames, dict[int, str]()
     opened: contextlib.AbstractContextManager[_Write]
     if movie:
         if half or bits is not None:
@@ -315,7 +315,8 @@ def render(
                 f"output {output}: {Arg('half', True)} and {Arg('bits')} are for frames, not for "
                 "movies"
             )
-        by = made_by(document, drawn, compare, space, codec, crf, sound)
+        shown = clip.frames, clip.skipped, fill
+        by = made_by(document, clip, drawn, compare, space, codec, crf, sound, *shown)
         repeated = []
         if skip_existing and Path(output).exists():
             state = existing.movie(Path(output), clip.frames, by)
@@ -340,21 +341,21 @@ def render(
         refuse_codec(output, codec, crf)
         pattern = FramePattern.parse(output, ", or a movie OUT.mp4 or OUT.mov")
         samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)
-        by = made_by(document, drawn, compare, space, samples)
+        by = made_by(document, clip, drawn, compare, space, samples)
         todo, repeated = frames_to_render(
-            clip, pattern, size, by, skip_existing=skip_existing, force=force
+            clip, pattern, size, by, fill, skip_existing=skip_existing, force=force
         )
         make_folder(pattern.folder)
         clip, left_out = with_surroundings(clip, pattern, drawn, compare)
         notes = [*repeated, *frame_notes(clip, pattern.extension), *left_out]
-        opened = contextlib.nullcontext(frame_files(clip, pattern, samples, by))
+        opened = contextlib.nullcontext(frame_files(clip, pattern, samples, by, filled))
     warnings = mismatches(document, clip, whole)
     notes = [*clip.notes, *notes]
     if tell is not None:
         for kind, texts in (("warning", warnings), ("note", notes)):
             for text in texts:
                 tell(kind, text)
-    painter = Painter(document, clip, drawn, compare, space, threads, fill)
+    painter = Painter(document, clip, drawn, compare, space, threads, fill, filled)
     written: list[Path] = []
     rendered: list[int] = []
     pending: Future[Path] | None = None
@@ -386,7 +387,7 @@ def render(
         sorted(set(clip.skipped) & set(todo)),
         [*warnings, *notes],
         sorted(set(clip.frames) - set(todo)),
-        painter.filled,
+        list(filled),
     )
 
 
@@ -444,31 +445,57 @@ def frames_to_render(
     pattern: FramePattern,
     size: tuple[int, int],
     by: str,
+    fill: Missing | Literal["leave out"],
     *,
     skip_existing: bool,
     force: bool,
 ) -> tuple[list[int], list[str]]:
     """Return the frames to write, after a check of their files, and a note on those written again.
 
-    `size` is that of the pictures, `by` what `made_by` returns.
+    `size` is that of the pictures, `by` what `made_by` returns, `fill` what bad frames show.
     """
     targets = dict(zip(clip.frames, pattern.paths(clip.frames), strict=True))
     there = {frame: path for frame, path in targets.items() if skip_existing and path.is_file()}
-    states = {frame: existing.frame(path, size, by) for frame, path in there.items()}
+    states = {f: _state_of(path, size, by, (clip, f, fill)) for f, path in there.items()}
     todo = [frame for frame in targets if states.get(frame) != "whole"]
     inputs = set(map(clip.file, clip.frames))
     check_targets([targets[frame] for frame in todo], inputs, force or skip_existing)
     return todo, existing.again(list(states.values()))
 
 
-def made_by(document: Document, *how: Output | str | float | None) -> str:
+def _state_of(
+    path: Path,
+    size: tuple[int, int],
+    by: str,
+    shown: tuple[Clip, int, Missing | Literal["leave out"]],
+) -> existing.State:
+    """Return what a frame's file is; one that fills a bad frame stays while that is bad."""
+    clip, frame, fill = shown
+    if fill == "leave out" and frame in clip.skipped:
+        return existing.frame(path, size, None)
+    filled = f"{by}, {fill}"
+    if frame in clip.skipped:
+        return existing.frame(path, size, filled)
+    state = existing.frame(path, size, by)
+    if state == "of another grade" and existing.frame(path, size, filled) == "whole":
+        try:
+            clip.load(frame)
+        except FrameError:
+            return "whole"
+    return state
+
+
+def made_by(document: Document, clip: Clip, *how: object) -> str:
     """Return what a file says of its origin; `how` is how it was drawn and stored.
 
-    A hash tells grades apart: their palettes, edits and colour spaces, not their clips' names.
+    A hash tells grades apart: their palettes, edits and colour spaces, and layers, views and
+    matrices of clips, but not their names.
     """
     fields = document.fields()
-    clip = {n: v for n, v in fields["clip"].items() if n not in ("name", "source")}
-    state = json.dumps([clip, fields["polytope"], fields["edits"], how], default=asdict)
+    own = {n: v for n, v in fields["clip"].items() if n not in ("name", "source")}
+    reading = clip.source.partition("?")[2]
+    grade = own, fields["polytope"], fields["edits"], reading
+    state = json.dumps([*grade, *how], default=lambda drawn: asdict(drawn))
     digest = hashlib.sha256(state.encode()).hexdigest()
     return f"palette4d {_core.__version__}, grade {digest[:16]}"
 
@@ -476,10 +503,12 @@ def made_by(document: Document, *how: Output | str | float | None) -> str:
 _Write = Callable[[Image, F32], Path]
 
 
-def frame_files(clip: Clip, pattern: FramePattern, samples: str, by: str) -> _Write:
+def frame_files(
+    clip: Clip, pattern: FramePattern, samples: str, by: str, filled: Mapping[int, str]
+) -> _Write:
     """Return a function that writes a frame to its file, with the source frame's metadata.
 
-    `by` is what `made_by` returns.
+    `by` is what `made_by` returns; `filled` has the bad frames, and what they show.
     """
 
     def write(image: Image, pixels: F32) -> Path:
@@ -490,13 +519,14 @@ def frame_files(clip: Clip, pattern: FramePattern, samples: str, by: str) -> _Wr
             kept = {name for name, _, _ in metadata}
             metadata += tuple(tag for tag in of_colours(clip) if tag[0] not in kept)
         path = pattern.path(image.frame)
+        software = f"{by}, {filled[image.frame]}" if image.frame in filled else by
         if image.around is not None and isinstance(clip, ImageClip) and clip.whole:
             held = image.around.file != clip.file(image.frame)
             own = timecode_in(metadata) if held else None
-            write_around(path, image.around, pixels, samples, own, software=by)
+            write_around(path, image.around, pixels, samples, own, software=software)
         else:
             premultiplied = clip.premultiplied
-            metadata += (("Software", "string", by),)
+            metadata += (("Software", "string", software),)
             write_frame(path, pixels, samples, premultiplied=premultiplied, metadata=metadata)
         return path
 

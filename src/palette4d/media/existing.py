@@ -13,14 +13,14 @@ from palette4d.media.clip import open_clip
 from palette4d.media.exr_around import has_every_block
 
 #: What `grade.rendering.made_by` returns.
-_MADE_BY = re.compile(r"palette4d \S+, grade [0-9a-f]{16}")
+_MADE_BY = re.compile(r"palette4d \S+, grade [0-9a-f]{16}(, .*)?")
 State = Literal["whole", "damaged", "of another grade"]
 
 
-def frame(path: Path, size: tuple[int, int], made_by: str) -> State:
+def frame(path: Path, size: tuple[int, int], made_by: str | None) -> State:
     """Look at a file that should be an image of (width, height), down to its last row.
 
-    One that names no grade, such as a frame that was retouched, is of none.
+    One that names no grade, such as a frame that was retouched, is of none. `made_by` None: of any.
     """
     import OpenImageIO as oiio
 
@@ -54,10 +54,11 @@ def movie(path: Path, frames: Sequence[int], made_by: str) -> State:
     return _state(len(clip.frames) == len(frames), clip.stated.made_by, made_by)
 
 
-def _state(whole: bool, text: str, made_by: str) -> State:
+def _state(whole: bool, text: str, made_by: str | None) -> State:
     if not whole:
         return "damaged"
-    return "of another grade" if _MADE_BY.fullmatch(text) and text != made_by else "whole"
+    other = made_by is not None and text != made_by and _MADE_BY.fullmatch(text)
+    return "of another grade" if other else "whole"
 
 
 def again(states: Sequence[State]) -> list[str]:

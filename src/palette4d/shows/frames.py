@@ -137,10 +137,10 @@ def _on_farm(
     pattern = FramePattern.parse(str(output))
     samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)
     drawn = Output(**picture)
-    by = rendering.made_by(document, drawn, compare, space, samples)
+    by = rendering.made_by(document, clip, drawn, compare, space, samples)
     size = clip.width * (2 if compare == "side" else 1), clip.height
     todo, repeated = rendering.frames_to_render(
-        clip, pattern, size, by, skip_existing=skip_existing, force=force
+        clip, pattern, size, by, fill, skip_existing=skip_existing, force=force
     )
     make_folder(pattern.folder)
     warnings = rendering.mismatches(document, clip, frames is None)
@@ -204,7 +204,7 @@ def render_frames(task: FramesTask, threads: int) -> Files:
     content = {}
     with tempfile.TemporaryDirectory(prefix="palette4d-") as folder:
         pattern = FramePattern(Path(folder), "", task.pattern.suffix, 1)
-        write = rendering.frame_files(clip, pattern, task.samples, task.by)
+        write = rendering.frame_files(clip, pattern, task.samples, task.by, painter.filled)
         for frame in task.frames:
             if (painted := painter.paint(frame)) is not None:
                 path = write(*painted)
