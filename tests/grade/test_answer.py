@@ -170,7 +170,7 @@ def test_frames_outside_the_range_and_bad_ones_are_not_looked_at(
         patched.setattr(ClipOfPicks, "read", bad)
         assert note(again(document), "of frame 4") is None
     document.change_pick("p1", until=1)
-    assert note(again(document), "of frame") is None
+    assert note(again(document), "of frame 4") is None
 
 
 @pytest.mark.parametrize("there", [0.0, 0.8])
