@@ -162,18 +162,6 @@ def test_a_box_beyond_the_picture_moves_with_it() -> None:
     assert Pick("p1", "pick", 0, (0, 0, 0), window=Window(0, keys)).lost((0, 19, 1)) == (None, 1)
 
 
-def test_a_box_does_not_slide_along_the_edge_of_a_plain_wall() -> None:
-    """The edge leans a little: a place farther down fits as well as one beside it."""
-    y, x = np.mgrid[:H, :W] + 0.5
-    shakes = 0.5 * np.sin(np.arange(20) * 1.7)
-    slope = 1 / 12
-    edges = [0.3 + 0.4 / (1 + np.exp(x + slope * y - 130 - shake)) for shake in shakes]
-    clip = clip_of(edges, 0.005)
-    keys = follow_window.boxes(clip, {0: (60, 20, 150, 115)}, (0, 19))
-    tops = [Window(0, keys).box_at(frame)[1] for frame in range(20)]
-    assert np.abs(np.array(tops) - 20).max() < 2
-
-
 def test_a_box_that_ends_at_the_pictures_edge_has_room_there() -> None:
     wide = texture(3, H + 60, W + 60, 4)
     clip = clip_of([wide[10:145, 35 - t : 35 - t + W] for t in range(20)])

@@ -56,15 +56,11 @@ DIGITS = 1
 
 @dataclass(frozen=True)
 class _Template:
-    """A part of a frame, (h, w), with its weights, and where the box begins in it (x, y).
-
-    `structure`, (2, 2), says how much a move changes it: along a straight edge hardly.
-    """
+    """A part of a frame, (h, w), with its weights, and where the box begins in it (x, y)."""
 
     values: F32
     weights: F32
     offset: F64
-    structure: F64
 
     @classmethod
     def of(cls, picture: I8, corner: F64, size: F64) -> _Template | None:
@@ -77,8 +73,7 @@ class _Template:
         # The middle of a box is the thing, its edges may be what is behind.
         hann = [np.sin(np.pi * (np.arange(n) + 0.5) / n) ** 2 for n in (bottom - top, right - left)]
         values = picture[top:bottom, left:right].astype(np.float32)
-        weights = np.outer(*hann).astype(np.float32)
-        return cls(values, weights, corner - (left, top), _structure(values, weights))
+        return cls(values, np.outer(*hann).astype(np.float32), corner - (left, top))
 
     def found(self, picture: I8, corner: F64, reach: int) -> tuple[float, F64]:
         """Return the best correlation near a place of the box, and the box's corner there."""
@@ -111,8 +106,7 @@ class _Template:
         own_mean, own_square = correlation(1, 0) / weight, correlation(2, 0) / weight
         both = correlation(1, 1) / weight - mean * own_mean
         spread = np.maximum(square - mean**2, 0) + NOISE**2
-        own_spread = np.maximum(own_square - own_mean**2, 0) + NOISE**2
-        score = both / np.sqrt(spread * own_spread)
+        score = both / np.sqrt(spread * (np.maximum(own_square - own_mean**2, 0) + NOISE**2))
         score = np.where(weight >= INSIDE * self.weights.sum(), score, -1)
         row, column = np.unravel_index(int(score.argmax()), score.shape)
         place = np.array(
@@ -121,33 +115,7 @@ class _Template:
                 row + _peak(score[:, column], int(row)),
             ]
         )
-        move = place + np.array((left, top)) + self.offset - corner
-        best = float(score[row, column])
-        gain = _gain(self.structure, (1 - best) * float(own_spread[row, column]))
-        return best, corner + gain @ move
-
-
-def _structure(values: F32, weights: F32) -> F64:
-    """Return the structure tensor, (2, 2): the mean product of the slopes along x and y."""
-    down, right = np.gradient(values.astype(np.float64))
-    slopes = np.stack([right.ravel(), down.ravel()])
-    return np.asarray(slopes * weights.ravel() @ slopes.T / weights.sum())
-
-
-def _gain(structure: F64, unlike: float) -> F64:
-    """Return the matrix that leaves of a move (x, y) what the pictures show of it.
-
-    `unlike` is the variance of their difference where they match best. Without this, boxes slide
-    along the edge of a plain wall, where the structure tensor has one large value (Shi, Tomasi:
-    "Good Features to Track", 1994).
-    """
-    changes, axes = np.linalg.eigh(structure)
-    # The slopes of the noise: each picture has half of the variance, and a slope half of that.
-    changes = np.maximum(changes - unlike / 4, 0)
-    # A place in whole pixels has a variance of 1/12 across the strongest edges.
-    error = max(float(changes[1]) / 12, 1e-9)
-    gains = (1 + 1 / 12) * changes / (changes + error)
-    return np.asarray(axes * gains @ axes.T)
+        return float(score[row, column]), place + np.array((left, top)) + self.offset
 
 
 def _peak(scores: NDArray[np.floating], index: int) -> float:
