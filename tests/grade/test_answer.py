@@ -150,6 +150,24 @@ def test_a_frame_that_a_correction_floods_is_told(monkeypatch: pytest.MonkeyPatc
     assert told.warns
 
 
+def test_of_many_corrections_a_few_frames_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    picture = np.tile(GREY, (H, W, 1))
+    picture[30:90, 20:60] = RED
+    document = document_of(monkeypatch, picture, frames=40)
+    pick = document.pick(0, pixel=(40.0, 60.0), box=9, to="#2040b0", follow=False)
+    path = tuple(PathKey(frame, pick.rgb, True) for frame in range(40))
+    grade = document.grade.put("pick", "p1", replace(pick, path=path))
+    clip, frames, read = ClipOfPicks.of(grade), set(), ClipOfPicks.read
+
+    def counted(self: ClipOfPicks, frame: int) -> NDArray[np.float32]:
+        frames.add(frame)
+        return read(self, frame)
+
+    monkeypatch.setattr(ClipOfPicks, "read", counted)
+    assert answer_to(grade, grade.pick("p1"), clip) is not None
+    assert len(frames) <= 12
+
+
 def test_frames_outside_the_range_and_bad_ones_are_not_looked_at(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

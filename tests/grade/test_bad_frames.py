@@ -233,7 +233,8 @@ class TestAgain:
         assert done.frames == [1, 2, 3, 4]
         assert any("4 of another grade" in note for note in done.notes)
         assert render(sidecar, clip, out, skip_existing=True, **NONE).frames == [1, 2, 3, 4]
-        assert render(sidecar, clip, out, skip_existing=True, strength=0.5).frames == [1, 2, 3, 4]
+        assert render(sidecar, clip, out, skip_existing=True, strength=1).frames == [1, 2, 3, 4]
+        assert render(sidecar, clip, out, skip_existing=True, strength=1.0).frames == []
 
     @pytest.mark.parametrize("output", ["o.#.png", "o.mov"])
     def test_what_is_of_the_grade_before_an_edit_is_rendered_again(

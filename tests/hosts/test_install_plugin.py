@@ -213,6 +213,8 @@ def test_root_installs_no_environment_that_names_what_all_may_make(
     (tmp_path / "open" / "there").mkdir(parents=True)
     (tmp_path / "open").chmod(0o1777)
     (site / "other.pth").write_text(f"{tmp_path / 'open/there'}\n", "utf-8")
+    (site / "folder.pth").mkdir()
+    (site / "gone.pth").symlink_to("nowhere")
     install_bundle(bundle, tmp_path / "OFX")
     (site / "other.pth").write_text(f"{tmp_path / 'open/later'}\n", "utf-8")
     with pytest.raises(Palette4dError, match=r"open may be changed by other users"):

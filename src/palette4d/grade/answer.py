@@ -46,6 +46,8 @@ SHARED = 0.2
 #: A thing of more than FLOOD of the frame that reaches three of its edges, and has more than FAR of
 #: its pixels in colours unlike the marked ones, is reported: it is seldom what was meant.
 FLOOD, FAR = 0.4, 0.3
+#: At most so many frames where a pick was corrected are looked at.
+MOST_CORRECTED = 8
 #: A taken colour farther than this from the line of the picked hue, in pick space, has another hue:
 #: faces beside red clothes have 0.08 to 0.12. A picked colour with less chroma than GREY has none.
 HUE, GREY = 0.08, 0.1
@@ -383,16 +385,17 @@ def _cost(view: _View, it: _Thing, hold: Pick, without: Grade) -> list[Note] | N
 def _elsewhen(view: _View, pick: Pick, ranged: Pick) -> Iterator[Note]:
     """Report a frame that the pick floods, and one where following loses what it takes.
 
-    Looked at are frames where the user corrected the pick, and some more: those of its range,
-    which `ranged` has.
+    Looked at are frames of its range, which `ranged` has: where the user corrected the pick, and
+    some more.
     """
     clip = view.clip.open()
     assert clip is not None
     corrected = [nearest_frame(clip, key.frame) for key in pick.path if key.given]
     unfollowed = replace(ranged, path=())
-    inside = {n for n in corrected if unfollowed.strength_at(n, 1.0) > 0.5}
+    inside = [n for n in corrected if unfollowed.strength_at(n, 1.0) > 0.5]
+    some = inside[:: -(-len(inside) // MOST_CORRECTED) or 1]
     views = []
-    for frame in sorted({*inside, *further_frames(unfollowed, clip.frames)} - {view.frame}):
+    for frame in sorted({*some, *further_frames(unfollowed, clip.frames)} - {view.frame}):
         with contextlib.suppress(FrameError):
             views.append(_View.of(view.grade, view.clip, frame))
     shares = [float(there.change(pick).mean()) for there in views]

@@ -157,6 +157,8 @@ print(*sys.path, sep="\\n")
 for folder in filter(os.path.isdir, sys.path):
     for name in [name for name in os.listdir(folder) if name.endswith(".pth")]:
         file = os.path.join(folder, name)
+        if not os.path.isfile(file):
+            continue  # as Python does
         with open(file, encoding="utf-8-sig", errors="surrogateescape") as lines:
             for line in map(str.strip, lines):
                 if line and not line.startswith(("#", "import ", "import\\t")):
