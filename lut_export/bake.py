@@ -44,6 +44,7 @@ from palette4d.common.errors import Arg, Palette4dError
 from palette4d.common.files import refuse_existing, replacing
 from palette4d.grade import sidecar as sidecars
 from palette4d.grade.document import Document
+from palette4d.media.oiio_text import file_name
 from palette4d.media.source_clip import frame_colours
 
 F32 = NDArray[np.float32]
@@ -222,6 +223,7 @@ def bake(
     format_ = format_of(output, format)
     sidecar, data, file = _opened(source)
     check_target(output, force, file)
+    file_name(output)  # for OpenColorIO
     check_settings(settings, format_, sidecar, frame)
     found_space = space_of(data, sidecar, space, ocio_config)
     image, image_frame = _picture(file, sidecar, frame, clip)

@@ -50,6 +50,7 @@ from palette4d.common.files import (
 from palette4d.common.text import checked_name, counted, file_safe
 from palette4d.jobs.workers import Workers
 from palette4d.media.clip_files import files_of_sidecar
+from palette4d.media.oiio_text import file_name
 
 #: The value of FRAME if the host does not set it; a file of that name exists.
 NO_FRAME = "default"
@@ -123,7 +124,7 @@ def write_config(
         Nothing was written; or only LUTs, if a frame could not be baked or OpenColorIO refuses the
         config.
     """
-    path = folder / "config.ocio"
+    path = Path(file_name(folder)) / "config.ocio"
     if folder.is_dir():
         refuse_existing(path, force)
     settings = replace(settings or BakeSettings(), space=PALETTE)

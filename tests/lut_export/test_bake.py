@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from pathlib import Path
@@ -17,6 +19,7 @@ from palette4d.lut_export import lut3d
 from palette4d.lut_export.bake import bake
 from palette4d.lut_export.bake_error import load, stated
 
+import palette4d
 from palette4d import Palette4dError, _core
 from palette4d.cli.main import main
 from palette4d.grade.document import Document
@@ -279,6 +282,20 @@ def test_existing_output_needs_force(warm_sidecar: Path, tmp_path: Path) -> None
     assert out.read_text(encoding="utf-8") == "mine"
     bake(warm_sidecar, 0.0, out, size=5, force=True)
     assert "LUT_3D_SIZE 5" in out.read_text(encoding="utf-8")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems refuse such names")
+def test_a_name_that_is_no_utf8_is_refused_where_opencolorio_writes_it(
+    warm_sidecar: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / os.fsdecode(b"d\xe9")
+    folder.mkdir()
+    with pytest.raises(Palette4dError, match="not UTF-8; rename"):
+        bake(warm_sidecar, 0.0, folder / "a.cube", size=5)
+    with pytest.raises(Palette4dError, match="not UTF-8; rename"):
+        palette4d.config([warm_sidecar], folder / "config", every=8, anyway=True)
+    assert not list(folder.iterdir())
+    Document.load(warm_sidecar).save(folder / "s.p4d.json")
 
 
 @pytest.mark.parametrize("name", ["a.cube", "a.clf"])

@@ -151,7 +151,8 @@ def save(
     replaces : bytes, optional
         The expected content of the file; another one is an error.
     """
-    members: Fields = _core.plain(document, os.fspath(path))
+    name = os.fspath(path).encode("utf-8", "backslashreplace").decode()
+    members: Fields = _core.plain(document, name)
     target = link_target(path)
     with locked(target) as held:
         old = existing(target, on_edits)
