@@ -62,20 +62,38 @@ class Folder:
                 f"{path}: found no such folder; expected one with media in it for {Arg('media')}"
             )
         self.path = path
-        self._by_name: dict[str, list[Path]] = {}
+        #: By the whole name; by the name without a number, sequences and single images.
+        self._exact: dict[str, list[Path]] = {}
+        self._sequences: dict[str, list[Path]] = {}
+        self._stills: dict[str, list[Path]] = {}
         for folder, files in _folders(path):
-            for file in _in_folder(folder, files):
-                self._by_name.setdefault(_plain(file.name), []).append(file)
+            self._list(folder, files)
+
+    def _list(self, folder: Path, files: list[str]) -> None:
+        """List a folder's movies, image sequences as patterns, and single images."""
+        numbered = set()
+        for sequence in clip_sequence.sequences_in(folder):
+            pattern, names = Path(sequence.pattern), [p.name for p in sequence.files.values()]
+            numbered |= set(names)
+            single = len(names) == 1
+            name, index = (names[0], self._stills) if single else (pattern.name, self._sequences)
+            self._exact.setdefault(_stem(name), []).append(pattern)
+            index.setdefault(_plain(name), []).append(pattern)
+        for name in files:
+            extension = clip_sequence.extension(name)
+            known = clip_sequence.MOVIE_EXTENSIONS | clip_sequence.IMAGE_EXTENSIONS
+            if extension in known and name not in numbered and not name.startswith("."):
+                self._exact.setdefault(_stem(name), []).append(folder / name)
 
     def find(self, names: Iterable[str]) -> Path | None:
         """Return the media for the first of the names that exists.
 
-        The name's own extension comes before others. If several folders hold the name, the folder
-        path most like the name's path wins.
+        The name's own number and extension come before others; a still of another number is none.
+        If several folders hold the name, the folder path most like the name's path wins.
         """
         for name in names:
             path = Path(name.replace("\\", "/"))  # an EDL may name the whole path of another system
-            files = self._by_name.get(_plain(path.name), [])
+            files = self._named(path.name)
             same = [f for f in files if f.suffix.lower() == path.suffix.lower()]
             if best := _most_alike(same or files, path):
                 if len(best) > 1:
@@ -86,6 +104,14 @@ class Folder:
                     )
                 return best[0]
         return None
+
+    def _named(self, name: str) -> list[Path]:
+        plain, stem = _plain(name), _stem(name)
+        files = self._exact.get(stem) or self._sequences.get(stem) or self._sequences.get(plain)
+        files = files or self._stills.get(stem)
+        if files is None and clip_sequence.frame_number(stem) is None:
+            files = self._stills.get(plain)
+        return files or []
 
 
 def _folders(path: Path) -> Iterator[tuple[Path, list[str]]]:
@@ -109,35 +135,27 @@ def _folders(path: Path) -> Iterator[tuple[Path, list[str]]]:
         left += reversed(below)
 
 
-def _in_folder(folder: Path, files: list[str]) -> Iterator[Path]:
-    """Yield movies, image sequences as patterns, and single images."""
-    numbered = set()
-    for sequence in clip_sequence.sequences_in(folder):
-        numbered |= {path.name for path in sequence.files.values()}
-        yield Path(sequence.pattern)
-    for name in files:
-        extension = clip_sequence.extension(name)
-        known = clip_sequence.MOVIE_EXTENSIONS | clip_sequence.IMAGE_EXTENSIONS
-        if extension in known and name not in numbered and not name.startswith("."):
-            yield folder / name
-
-
 def _plain(name: str) -> str:
     """Return a file's name without extension and frame number, for comparison.
 
     >>> _plain("A001C003.mov"), _plain("sh010.1001.exr"), _plain("sh010.####.exr"), _plain("v2.mov")
     ('a001c003', 'sh010', 'sh010', 'v2')
     """
-    path = Path(name)
-    suffix = path.suffix.lower().lstrip(".")
-    known = clip_sequence.MOVIE_EXTENSIONS | clip_sequence.IMAGE_EXTENSIONS
+    stem = _stem(name)
+    if clip_sequence.extension(name) not in clip_sequence.IMAGE_EXTENSIONS:
+        return stem
+    pattern = re.search(r"[._ -]?(%0?[0-9]*d|#+|@+|\[[0-9]+-[0-9]+\])$", stem)
+    if pattern:
+        return stem[: pattern.start()]
+    numbered = clip_sequence.frame_number(stem)
+    return stem if numbered is None else numbered[0].rstrip("._- ") or stem
+
+
+def _stem(name: str) -> str:
+    """Return a file's name without extension, in lower case."""
     # The text after the last dot of a clip's name need not be an extension.
-    stem = path.stem if suffix in known | CAMERA else name
-    if suffix in clip_sequence.IMAGE_EXTENSIONS:
-        stem = re.sub(r"[._ -]?(%0?[0-9]*d|#+|@+|\[[0-9]+-[0-9]+\])$", "", stem)
-        if numbered := clip_sequence.frame_number(stem):
-            stem = numbered[0].rstrip("._- ") or stem
-    return stem.lower()
+    known = clip_sequence.MOVIE_EXTENSIONS | clip_sequence.IMAGE_EXTENSIONS | CAMERA
+    return (Path(name).stem if clip_sequence.extension(name) in known else name).lower()
 
 
 def _most_alike(files: list[Path], path: Path) -> list[Path]:
