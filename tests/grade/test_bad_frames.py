@@ -268,9 +268,17 @@ class TestAgain:
         assert render(PLAIN, clip, frames, **again).frames == [3]
         assert render(PLAIN, clip, tmp_path / "o.mov", **again).frames == [1, 2, 3, 4, 5, 6]
         sequence(tmp_path / "in", [5])
+        assert render(PLAIN, clip, tmp_path / "o.mov", **again).frames == [1, 2, 3, 4, 5, 6]
         assert render(PLAIN, clip, frames, **again).frames == [5]
         assert render(PLAIN, clip, frames, **again).frames == []
         assert levels(frames) == {1: 10, 2: 20, 3: 30, 4: 40, 5: 50, 6: 60}
+
+    def test_what_is_held_is_the_frame_before_as_it_is_now(self, tmp_path: Path) -> None:
+        clip, out = sequence(tmp_path / "in", [1, 4]), tmp_path / "o.####.png"
+        render(PLAIN, clip, out, **NONE)
+        sequence(tmp_path / "in", [2])
+        assert render(PLAIN, clip, out, skip_existing=True, **NONE).frames == [2, 3]
+        assert levels(out) == {1: 10, 2: 20, 3: 20, 4: 40}
 
     def test_a_movie_of_other_frames_is_another(self, tmp_path: Path) -> None:
         clip, out = sequence(tmp_path / "in", [1, 2, 3, 4]), tmp_path / "o.mov"

@@ -123,6 +123,28 @@ def test_the_middle_of_the_largest_part(side: int, box: int) -> None:
         assert middle == (20 + side // 2, 10 + side // 2)
 
 
+def test_numbers_and_lists_of_any_kind_are_saved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    picture = np.tile(np.float32([0.4, 0.4, 0.4]), (20, 30, 1))
+    picture[5:15, 5:15] = 0.8, 0.3, 0.2
+    document = document_of(monkeypatch, picture)
+    one, half = np.int64(1), np.float32(0.5)
+    document.pick(np.int64(0), pixel=np.array([10, 10]), box=one, to=np.array([0.1, 0.5, 0.2]))
+    document.add_area("p1", Area(0, [(6, 8), (7, 9)], 2))  # type: ignore[arg-type]
+    document.add_area("p1", Area(one, np.array([[6.5, 8], [7, 9]]), half))  # type: ignore[arg-type]
+    document.hold(0, pixel=[20, 10], box=3, start=one, fade=half)
+    document.change_pick("p1", reach=half, lightness=np.array([0, 0.5]), enabled=np.bool_(True))
+    document.set_window("p1", one, np.array([1, 2, 20, 18]), feather=half)
+    for wrong in ({"enabled": "no"}, {"enabled": 0}, {"areas": [Area(0, (), 1)]}):
+        with pytest.raises(Palette4dError):
+            document.change_pick("p1", **wrong)
+    document.save(tmp_path / "s.p4d.json")
+    again = Document.load(tmp_path / "s.p4d.json")
+    assert again.grade.picks == document.grade.picks
+    assert again.history == document.history
+
+
 def test_another_pixel_without_a_box_is_that_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
     picture = np.tile(np.float32([0.4, 0.4, 0.4]), (20, 30, 1))
     picture[10, 20] = 0.8, 0.3, 0.2

@@ -101,7 +101,7 @@ def test_exr_texts_that_are_no_utf_8(tmp_path: Path, old: bytes, new: bytes, fur
 def test_an_exr_that_promises_more_blocks_is_damaged(tmp_path: Path, count: bytes) -> None:
     path = write_image(tmp_path / "o.exr", PIXELS, chunkCouNt=16)
     changed(path, b"chunkCouNt\0int\0\4\0\0\0\x10\0\0\0", b"chunkCount\0int\0\4\0\0\0" + count)
-    assert existing.frame(path, (24, 16), "") == "damaged"
+    assert existing.frame(path, (24, 16), bool) == "damaged"
 
 
 def frames(count: int) -> list[np.ndarray]:

@@ -27,7 +27,7 @@ from palette4d.grade.picks import (
     Window,
     WindowKey,
     as_box,
-    check,
+    checked,
 )
 
 #: The feather of a new window, as a share of the box's shorter side.
@@ -167,7 +167,8 @@ def add_area(grade: Grade, clip: ClipOfPicks, id: str, area: Area) -> Grade:
     clip.check_places(area.frame, area.points)
     what = "a box" if len(area.points) == 1 else "a stroke"
     label = f"add {what} at frame {area.frame:g} to {id}"
-    return _learned(grade, clip, replace(old, areas=(*old.areas, area)), label)
+    new = checked(replace(old, areas=(*old.areas, area)), grade.frames)
+    return _learned(grade, clip, new, label)
 
 
 def set_window(
@@ -205,7 +206,7 @@ def set_window(
         key = WindowKey(frame, as_box(box), given=True)
         new = replace(old, window=_with_key(old.window, key, feather))
         text = _window_text(new, frame)
-    check(new, grade.frames)
+    new = checked(new, grade.frames)
     if follow:
         new = _window_followed(clip, new, progress)
     return grade.put("pick", id, new, f"change {id}: {text}")
@@ -280,7 +281,7 @@ def change_pick(
     if new.enabled and not old.enabled:
         _check_room(grade)
     grade.check_frame(new.frame)
-    check(new, grade.frames)
+    new = checked(new, grade.frames)
     ranged = {"start", "until", "fade", "fade_out"} & changes.keys()
     moved = ranged | {"frame", "rgb"} & changes.keys()
     stays = moved == ranged and known(old.path, new, grade)
@@ -386,7 +387,7 @@ def _add(
     when = ("areas", "start", "until", "fade", "fade_out")
     made = _with_one_fade(replace(made, **{name: given[name] for name in when if name in given}))
     grade.check_frame(made.frame)
-    check(made, grade.frames)
+    made = checked(made, grade.frames)
     for area in made.areas:
         clip.check_places(area.frame, area.points)
     if asked.get("follow", True):

@@ -349,8 +349,16 @@ class Pick:
         return float(np.interp(frame, frames, there)) if there.size else 1.0
 
 
-def check(pick: Pick, frames: tuple[int, int, int]) -> None:
-    """Refuse a pick whose range is empty or outside the clip, or whose values are out of range."""
+def checked(pick: Pick, frames: tuple[int, int, int]) -> Pick:
+    """Return a pick with plain numbers and tuples, as files hold them.
+
+    Refuses one whose range is empty or outside the clip, or whose values are out of range.
+    """
+    pick = _native(pick)
+    if type(pick.enabled) is not bool:
+        raise Palette4dError(f"found enabled={pick.enabled!r}, expected True or False")
+    if not all(area.points for area in pick.areas):
+        raise Palette4dError("found an area without points, expected one or more")
     first, last, _ = frames
     start = first if pick.start is None else pick.start
     until = last if pick.until is None else pick.until
@@ -383,6 +391,19 @@ def check(pick: Pick, frames: tuple[int, int, int]) -> None:
         _check_window(pick.window)
     if pick.toward not in ("shift", "colour"):
         raise Palette4dError(f"found toward {pick.toward!r}, expected 'shift' or 'colour'")
+    return pick
+
+
+def _native(value: Any) -> Any:
+    """Return a value of numbers and tuples, whatever NumPy's or lists it is made of."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return tuple(map(_native, value))
+    if isinstance(value, Pick | PathKey | Area | Window | WindowKey):
+        fields = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+        return dataclasses.replace(value, **{n: _native(part) for n, part in fields.items()})
+    return value
 
 
 def _check_window(window: Window) -> None:

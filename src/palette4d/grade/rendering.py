@@ -159,7 +159,7 @@ class Painter:
         if painted is not None or self.missing == "leave out":
             return painted
         image, pixels = self._nearest(frame)
-        self.filled[frame] = self.missing
+        self.filled[frame] = _filled(self.missing, image.frame)
         if self.missing == "black":
             pixels = np.zeros_like(pixels)
         rate = rate_of(self.clip, self.document)
@@ -315,11 +315,13 @@ def render(
                 f"output {output}: {Arg('half', True)} and {Arg('bits')} are for frames, not for "
                 "movies"
             )
-        shown = clip.frames, clip.skipped, fill
+        # A frame that could not be read may be whole now.
+        sizes = [path.stat().st_size for path in map(clip.file, clip.frames) if path.is_file()]
+        shown = clip.frames, sizes, clip.skipped, fill
         by = made_by(document, clip, drawn, compare, space, codec, crf, sound, *shown)
         repeated = []
         if skip_existing and Path(output).exists():
-            state = existing.movie(Path(output), clip.frames, by)
+            state = existing.movie(Path(output), clip.frames, by.__eq__)
             if state == "whole":
                 return Rendered([Path(output)], [], [], [], kept=list(clip.frames))
             repeated = existing.again([state])
@@ -456,33 +458,37 @@ def frames_to_render(
     """
     targets = dict(zip(clip.frames, pattern.paths(clip.frames), strict=True))
     there = {frame: path for frame, path in targets.items() if skip_existing and path.is_file()}
-    states = {f: _state_of(path, size, by, (clip, f, fill)) for f, path in there.items()}
+    states = {
+        frame: existing.frame(
+            path, size, lambda text, frame=frame: _is_wanted(text, by, clip, frame, fill)
+        )
+        for frame, path in there.items()
+    }
     todo = [frame for frame in targets if states.get(frame) != "whole"]
     inputs = set(map(clip.file, clip.frames))
     check_targets([targets[frame] for frame in todo], inputs, force or skip_existing)
     return todo, existing.again(list(states.values()))
 
 
-def _state_of(
-    path: Path,
-    size: tuple[int, int],
-    by: str,
-    shown: tuple[Clip, int, Missing | Literal["leave out"]],
-) -> existing.State:
-    """Return what a frame's file is; one that fills a bad frame stays while that is bad."""
-    clip, frame, fill = shown
-    if fill == "leave out" and frame in clip.skipped:
-        return existing.frame(path, size, None)
-    filled = f"{by}, {fill}"
-    if frame in clip.skipped:
-        return existing.frame(path, size, filled)
-    state = existing.frame(path, size, by)
-    if state == "of another grade" and existing.frame(path, size, filled) == "whole":
+def _is_wanted(
+    text: str, by: str, clip: Clip, frame: int, fill: Missing | Literal["leave out"]
+) -> bool:
+    """Whether a frame's file with this `Software` is what a render would write."""
+    bad = frame in clip.skipped
+    if bad and fill == "leave out":
+        return True
+    if not bad and text.startswith(f"{by}, "):  # it was bad
         try:
             clip.load(frame)
         except FrameError:
-            return "whole"
-    return state
+            bad = True
+    shown = (other for other in clip.nearest_to(frame) if other not in clip.skipped)
+    return text == (f"{by}, {_filled(fill, next(shown, frame))}" if bad else by)
+
+
+def _filled(fill: str, frame: int) -> str:
+    """Return what a file says of a bad frame that shows another one."""
+    return fill if fill == "black" else f"{fill} {frame}"
 
 
 def made_by(document: Document, clip: Clip, *how: object) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -17,10 +17,11 @@ _MADE_BY = re.compile(r"palette4d \S+, grade [0-9a-f]{16}(, .*)?")
 State = Literal["whole", "damaged", "of another grade"]
 
 
-def frame(path: Path, size: tuple[int, int], made_by: str | None) -> State:
+def frame(path: Path, size: tuple[int, int], is_wanted: Callable[[str], bool]) -> State:
     """Look at a file that should be an image of (width, height), down to its last row.
 
-    One that names no grade, such as a frame that was retouched, is of none. `made_by` None: of any.
+    `is_wanted` says whether a text that names a grade is that of the render. A file that names
+    none, such as a frame that was retouched, stays.
     """
     import OpenImageIO as oiio
 
@@ -42,23 +43,23 @@ def frame(path: Path, size: tuple[int, int], made_by: str | None) -> State:
     source.close()
     if whole and rows and path.suffix.lower() == ".exr":
         whole = has_every_block(path)
-    return _state(whole, spec.get_string_attribute("Software"), made_by)
+    return _state(whole, spec.get_string_attribute("Software"), is_wanted)
 
 
-def movie(path: Path, frames: Sequence[int], made_by: str) -> State:
-    """Look at a file that should be a movie of as many frames."""
+def movie(path: Path, frames: Sequence[int], is_wanted: Callable[[str], bool]) -> State:
+    """Look at a file that should be a movie of as many frames, as `frame` does."""
     try:
         clip = open_clip(str(path))
     except (Palette4dError, OSError):
         return "damaged"
-    return _state(len(clip.frames) == len(frames), clip.stated.made_by, made_by)
+    return _state(len(clip.frames) == len(frames), clip.stated.made_by, is_wanted)
 
 
-def _state(whole: bool, text: str, made_by: str | None) -> State:
+def _state(whole: bool, text: str, is_wanted: Callable[[str], bool]) -> State:
     if not whole:
         return "damaged"
-    other = made_by is not None and text != made_by and _MADE_BY.fullmatch(text)
-    return "of another grade" if other else "whole"
+    stays = not _MADE_BY.fullmatch(text) or is_wanted(text)
+    return "whole" if stays else "of another grade"
 
 
 def again(states: Sequence[State]) -> list[str]:
