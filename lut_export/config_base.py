@@ -102,10 +102,14 @@ def relocate(config: Any, base: str, archive: bool, folder: Path) -> list[str]:
         # Put it first: only a base that palette4d wrote can have files of the same names.
         config.addSearchPath(LUTS)
         for path in own or [""]:
-            absolute = Path(path).is_absolute() or path.startswith(("$", "%"))
-            moved = path if absolute or not root else str(Path(root) / path)
-            if moved != LUTS:
-                config.addSearchPath(moved or ".")
+            # A variable may hold either: OpenColorIO passes over what is not there.
+            either = path.startswith(("$", "%"))
+            absolute = Path(path).is_absolute()
+            moved = [path] if absolute or either or not root else []
+            moved += [str(Path(root) / path)] if root and not absolute else []
+            for one in moved:
+                if one != LUTS:
+                    config.addSearchPath(one or ".")
         if root and not archive:
             notes.append(f"the base's own files are still read from {root}")
         # If a config lists variables, OpenColorIO ignores all other environment variables.

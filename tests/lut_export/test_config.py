@@ -394,6 +394,16 @@ class TestBase:
         got = shown(done.path, {}, ocio.ColorSpaceTransform(src="srgb_tx", dst="half"))
         np.testing.assert_allclose(got, colours() / 2, atol=1e-6)
 
+    def test_a_variable_may_hold_a_folder_beside_the_base(self, shot: Path, tmp_path: Path) -> None:
+        base = self.own(tmp_path)
+        text = base.read_text("utf-8").replace("search_path: files", "search_path: $WHERE")
+        text = text.replace("environment:\n  {}\n", "")
+        line = next(line for line in text.splitlines() if line.startswith("search_path"))
+        base.write_text(text.replace(line, f"environment: {{WHERE: files}}\n{line}"), "utf-8")
+        done = write_config([shot], tmp_path / "show", **options(5, base=str(base)))
+        got = shown(done.path, {}, ocio.ColorSpaceTransform(src="srgb_tx", dst="half"))
+        np.testing.assert_allclose(got, colours() / 2, atol=1e-6)
+
     def test_the_value_of_a_variable_that_is_no_path_stays_out(
         self, shot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
