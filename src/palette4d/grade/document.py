@@ -697,6 +697,6 @@ def _beside(source: str, old: Path | None, new: Path) -> str:
     """
     if not source or Path(source).is_absolute():
         return source
-    clip = source if old is None else old.absolute().parent / source
+    clip = source if old is None else Path(os.path.realpath(old)).parent / source
     lost = old is not None and not Path(clip).parent.is_dir()
     return source if lost else beside(Path(clip), new.absolute().parent)
