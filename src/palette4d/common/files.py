@@ -1,6 +1,7 @@
 """The only atomic writer: readers see the old file or the new file, never a part."""
 
 import contextlib
+import errno
 import os
 import re
 import secrets
@@ -497,7 +498,9 @@ def _sync_folder(folder: Path) -> None:
 
 
 def unwritten(path: Path, error: OSError) -> WriteError:
-    """Return the error for a file that the disk did not take."""
+    """Return the error for a file that the disk did not take, or the folder did not give up."""
+    if error.errno in (errno.EPERM, errno.EACCES):
+        return closed(path, f": {error.strerror}")
     return WriteError(
         f"{path}: cannot be written: {error.strerror or error}; expected a disk with room, "
         "make some or choose another folder"
