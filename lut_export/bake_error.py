@@ -271,6 +271,8 @@ def stated(value: float, digits: int = 3) -> str:
     """
     if value <= 0:
         return "0"
+    if not value < 1e20:
+        return f"{value:.{digits}g}"
     exact = Decimal(value)
     step = Decimal(1).scaleb(exact.adjusted() - digits + 1)
     return f"{float(exact.quantize(step, rounding=ROUND_CEILING)):.{digits}g}"

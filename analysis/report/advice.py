@@ -155,6 +155,13 @@ def _lookalikes(x: Report, options: AnalysisOptions) -> str:
 def _concave(x: Report) -> str:
     if x.concavity[0] <= CONCAVE:
         return ""
+    share, frame = x.crossed
+    if share:
+        return (
+            f"at frame {frame} the palette crosses itself, and edits draw wild colours in "
+            f"{max(share, 0.001):.1%} of the picture: raise {Arg('convexity')}, or choose another "
+            f"colour space with {Arg('palette_space')}"
+        )
     return (
         f"at frame {x.concavity[1]} the palette is not convex (it lacks {x.concavity[0]:.0%} of "
         f"its convex hull), and recoloured gradients may step there: raise {Arg('convexity')}"

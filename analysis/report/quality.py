@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis.convex_hulls import concavity, narrow
+from palette4d.analysis.convex_hulls import CONCAVE, concavity, narrow
 from palette4d.analysis.frame_statistics import CODE_STEP, FrameStatistics
 from palette4d.analysis.handle_use import handle_use
 from palette4d.analysis.losses import LOST, NO_FACES
@@ -20,6 +20,9 @@ from palette4d.analysis.options import AnalysisOptions
 from palette4d import _core
 
 F64 = NDArray[np.float64]
+# Mean value weights sum to 1. Where their absolute values sum to more than this, an edit moves
+# colours by more than it moves any handle; in palettes that do not cross themselves they sum to 1.
+WILD = 3.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,6 +51,8 @@ class Report:
     least_used : the least used handle and its largest mean weight (eq. 7) in any frame.
     concavity : the largest share of its convex hull that a slice lacks, and its frame; frames of
         nearly one colour do not count.
+    crossed : the largest share of a frame's colours whose weights nearly cancel, as the palette
+        crosses itself there, and that frame.
     splits, merges : vertices where a colour becomes several, or several one.
     colours : palette colours of a frame, on average.
     """
@@ -56,6 +61,7 @@ class Report:
     closest: tuple[float, int, str, str] | None
     least_used: tuple[str, float]
     concavity: tuple[float, int]
+    crossed: tuple[float, int]
     splits: int
     merges: int
     colours: float
@@ -128,6 +134,11 @@ def report(
         closest=_closest(polytope, slices, frames),
         least_used=_least_used(polytope, slices, frames),
         concavity=max(concavities, key=lambda depth_and_frame: depth_and_frame[0]),
+        crossed=max(
+            (_crossed(s, f), f.frame)
+            for (s, f), (depth, _) in zip(pairs, concavities, strict=True)
+            if depth > CONCAVE or f is frames[0]  # a convex one does not cross itself
+        ),
         splits=int((out_degree[sources] > 1).sum()),
         merges=int((in_degree[targets] > 1).sum()),
         colours=float(np.mean([len(s.rgb) for s in slices])),
@@ -144,6 +155,15 @@ def _fit(cut: _core.Slice, frame: FrameStatistics, options: AnalysisOptions) -> 
         measured(slight=limit)[3] if farthest > limit else 0.0 for limit in (CODE_STEP, LOST)
     )
     return FrameFit(frame.frame, options.lambda_ * r + c, outside, visible, farthest, lost)
+
+
+def _crossed(cut: _core.Slice, frame: FrameStatistics) -> float:
+    """Return the share of a frame's colours whose weights, but for their signs, sum to `WILD`."""
+    if len(cut.faces) == 0:
+        return 0.0
+    weights, _ = _core.palette_weights(frame.coarse.rgb, cut.rgb, cut.faces)
+    wild = np.abs(weights).sum(axis=1) > WILD
+    return float(frame.coarse.counts @ wild / frame.coarse.total)
 
 
 def _closest(

@@ -458,12 +458,11 @@ def frames_to_render(
     """
     targets = dict(zip(clip.frames, pattern.paths(clip.frames), strict=True))
     there = {frame: path for frame, path in targets.items() if skip_existing and path.is_file()}
-    states = {
-        frame: existing.frame(
-            path, size, lambda text, frame=frame: _is_wanted(text, by, clip, frame, fill)
-        )
-        for frame, path in there.items()
-    }
+
+    def state_of(frame: int, path: Path) -> existing.State:
+        return existing.frame(path, size, lambda text: _is_wanted(text, by, clip, frame, fill))
+
+    states = {frame: state_of(frame, path) for frame, path in there.items()}
     todo = [frame for frame in targets if states.get(frame) != "whole"]
     inputs = set(map(clip.file, clip.frames))
     check_targets([targets[frame] for frame in todo], inputs, force or skip_existing)

@@ -27,6 +27,7 @@ def report(**changes) -> Report:
         "closest": (0.2, 3, "v1", "v2"),
         "least_used": ("v3", 0.05),
         "concavity": (0.0, 0),
+        "crossed": (0.0, 0),
         "splits": 0,
         "merges": 0,
         "colours": 6.0,
@@ -132,3 +133,10 @@ def test_what_is_advised_helps(frames, options, advised, better):
     assert advised in text
     mended = pipeline.analyze(clip, AnalysisOptions(**better), allow_cuts=True)
     assert not [note for note in mended.notes if "fit" in note]
+
+
+def test_a_palette_that_crosses_itself_says_so():
+    (text,) = said({"concavity": (0.2, 5), "crossed": (0.08, 6)})
+    assert "frame 6 the palette crosses itself" in text
+    assert "8.0%" in text
+    assert "convexity=" in text

@@ -46,6 +46,23 @@ def test_fits_are_the_frames_own_losses(frames):
     assert (found.splits, found.merges) == (0, 0)
 
 
+@pytest.mark.parametrize("crosses", [False, True])
+def test_a_palette_that_crosses_itself_is_found(crosses):
+    """A house whose top is pushed in, or whose corners have changed places."""
+    floor = np.array([[0.1, 0.1], [0.9, 0.1], [0.9, 0.9], [0.1, 0.9]])
+    walls = np.vstack([np.c_[floor, np.full(4, z)] for z in (0.1, 0.9)])
+    mesh = hull_mesh(np.vstack([walls, [0.5, 0.5, 1.0]]))
+    rgb = mesh.rgb.copy()
+    if crosses:
+        rgb = rgb[np.random.default_rng(26).permutation(len(rgb))]
+    else:
+        rgb[np.argmax(rgb[:, 2]), 2] = 0.5
+    frames = stats([np.random.default_rng(0).random((40, 50, 3)).astype(np.float32)] * 5)
+    found = quality.report(in_core(resting(rgb, mesh.faces), frames), frames, OPTIONS)
+    assert found.concavity[0] > 0.1
+    assert (found.crossed[0] > 0) == crosses
+
+
 def test_look_alikes_are_found_and_named(frames):
     five = np.vstack([FOUR, [0.92, 0.17, 0.2]])
     mesh = hull_mesh(five)
