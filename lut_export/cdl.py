@@ -81,15 +81,26 @@ def fit(edit: FrameEdit, colours: F32) -> Cdl:
     wanted = edit.exact(points)
     scale = np.maximum(np.abs(wanted), FLOOR)
 
-    def residual(numbers: F64) -> F64:
-        return ((_apply(numbers, points) - wanted) / scale).ravel()
+    def solved(goal: F64) -> F64:
+        def residual(numbers: F64) -> F64:
+            return ((_apply(numbers, points) - goal) / scale).ravel()
+
+        found: F64 = least_squares(residual, start, bounds=(low, high), max_nfev=200).x
+        return found
+
+    def seen(numbers: F64) -> float:
+        off = np.maximum(_apply(numbers, points), 0) - np.maximum(wanted, 0)
+        return float((np.abs(off) / scale).mean())
 
     start = np.array([1.0] * 3 + [0.0] * 3 + [1.0] * 3 + [1.0])
     # The standard forbids negative slope, power and saturation; powers near 0 make steps.
     low = np.array([0.0] * 3 + [-10.0] * 3 + [0.1] * 3 + [0.0])
     high = np.array([100.0] * 3 + [10.0] * 3 + [10.0] * 3 + [10.0])
-    solution = least_squares(residual, start, bounds=(low, high), max_nfev=200)
-    rounded = [round(float(value), DIGITS) + 0.0 for value in solution.x]
+    solutions = [solved(wanted)]
+    if (wanted < 0).any():
+        # Below 0 a CDL gets by large offsets without saturation, which other colours pay for.
+        solutions.append(solved(np.maximum(wanted, 0)))
+    rounded = [round(float(value), DIGITS) + 0.0 for value in min(solutions, key=seen)]
     return Cdl(_triple(rounded[0:3]), _triple(rounded[3:6]), _triple(rounded[6:9]), rounded[9])
 
 

@@ -113,7 +113,7 @@ def test_large_pictures_have_delta_e_on_part_of_their_colours(
     assert got.worst.delta_e_mean > 0
 
 
-@pytest.mark.parametrize("value", [0.0, 1e-12, 0.0123401, 0.5, 0.9999, 3.0, 123.4])
+@pytest.mark.parametrize("value", [0.0, 1e-12, 0.0123401, 0.5, 0.9999, 3.0, 123.4, 5e36, np.inf])
 def test_stated_figures_are_never_too_small(value: float) -> None:
     assert value <= float(stated(value)) <= value * 1.01
 
