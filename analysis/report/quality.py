@@ -135,9 +135,12 @@ def report(
         least_used=_least_used(polytope, slices, frames),
         concavity=max(concavities, key=lambda depth_and_frame: depth_and_frame[0]),
         crossed=max(
-            (_crossed(s, f), f.frame)
-            for (s, f), (depth, _) in zip(pairs, concavities, strict=True)
-            if depth > CONCAVE or f is frames[0]  # a convex one does not cross itself
+            (
+                (_crossed(s, f), f.frame)
+                for (s, f), (depth, _) in zip(pairs, concavities, strict=True)
+                if depth > CONCAVE  # a convex one does not cross itself
+            ),
+            default=(0.0, frames[0].frame),
         ),
         splits=int((out_degree[sources] > 1).sum()),
         merges=int((in_degree[targets] > 1).sum()),
