@@ -234,7 +234,7 @@ class TestAgain:
         assert any("4 of another grade" in note for note in done.notes)
         assert render(sidecar, clip, out, skip_existing=True, **NONE).frames == [1, 2, 3, 4]
         assert render(sidecar, clip, out, skip_existing=True, strength=1).frames == [1, 2, 3, 4]
-        assert render(sidecar, clip, out, skip_existing=True, strength=1.0).frames == []
+        assert render(sidecar, clip, out, skip_existing=True, strength=np.float32(1)).frames == []
 
     @pytest.mark.parametrize("output", ["o.#.png", "o.mov"])
     def test_what_is_of_the_grade_before_an_edit_is_rendered_again(

@@ -252,6 +252,11 @@ def test_metadata_that_is_no_utf8_is_taken_as_latin_1(tmp_path):
     assert {name: value for name, _, value in image.metadata}["Copyright"] == "André"
 
 
+def test_a_path_is_a_name_too(tmp_path):
+    write_image(tmp_path / "c.0001.png", np.zeros((2, 2, 3), np.uint8))
+    assert open_clip(tmp_path).frames == open_clip(tmp_path / "c.####.png").frames == [1]
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems refuse such names")
 def test_a_file_name_that_is_no_utf8_is_refused(tmp_path):
     image = write_image(tmp_path / "c.png", np.zeros((2, 2, 3), np.uint8))

@@ -500,13 +500,13 @@ def made_by(document: Document, clip: Clip, *how: object) -> str:
     own = {n: v for n, v in fields["clip"].items() if n not in ("name", "source")}
     reading = clip.source.partition("?")[2]
     grade = own, fields["polytope"], fields["edits"], reading
-    state = json.dumps([*grade, *how], default=_numbers_as_floats)
+    state = json.dumps([*grade, *how], default=_plain)
     digest = hashlib.sha256(state.encode()).hexdigest()
     return f"palette4d {_core.__version__}, grade {digest[:16]}"
 
 
-def _numbers_as_floats(drawn: Output) -> dict[str, object]:
-    return {n: float(v) if isinstance(v, int) else v for n, v in asdict(drawn).items()}
+def _plain(drawn: Output) -> dict[str, object]:
+    return {n: v if isinstance(v, str) else float(v) for n, v in vars(drawn).items()}
 
 
 _Write = Callable[[Image, F32], Path]

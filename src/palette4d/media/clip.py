@@ -7,6 +7,7 @@ time, (h, w, 3 or 4) float32, in rising order of frame numbers. Colours and alph
 
 from __future__ import annotations
 
+import os
 from fractions import Fraction
 from pathlib import Path
 
@@ -18,7 +19,7 @@ __all__ = ["Clip", "ClipError", "FrameError", "Image", "open_clip"]
 
 
 def open_clip(
-    spec: str,
+    spec: str | os.PathLike[str],
     *,
     frames: str | None = None,
     rate: Fraction | None = None,
@@ -28,7 +29,7 @@ def open_clip(
 
     Parameters
     ----------
-    spec : str
+    spec : str or path
         `name.####.exr` (one # a digit), `name.%04d.exr`, `name.@@@@.exr`, `name.1-10x2#.exr`, a
         folder with one image sequence, a single image, or a movie file. It may end in how the clip
         is read: `?layer=NAME`, `?view=NAME` of EXR, `?matrix=709` (601, 2020) of a movie that
@@ -52,6 +53,7 @@ def open_clip(
     """
     if rate is not None and rate <= 0:
         raise ClipError(f"rate {rate}: expected frames a second above 0, such as 24 or 24000/1001")
+    spec = os.fspath(spec)
     if not spec.strip():
         raise ClipError(
             "the clip's name is empty; expected a pattern such as name.####.exr, a folder (. is "

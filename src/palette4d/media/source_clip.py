@@ -1,5 +1,6 @@
 """The clip of a sidecar: given by the user, or found at the path in the sidecar."""
 
+import os
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -35,7 +36,8 @@ def find_clip(sidecar_path: Path, clip: Mapping[str, Any], given: str | None) ->
     `Sidecar.clip`. A `given` clip is used instead and must open.
     """
     if given is not None:
-        return open_clip(like_source(given, str(clip["source"])), skip_bad_frames=True)
+        name = like_source(os.fspath(given), str(clip["source"]))
+        return open_clip(name, skip_bad_frames=True)
     for spec in candidates(sidecar_path, str(clip["source"])):
         try:
             # Callers need only a few frames: missing frames elsewhere do not matter.

@@ -309,6 +309,8 @@ def _chooser(
     every: int | None, stops: bool, frames: str | None, *, show: bool
 ) -> Callable[[_core.Sidecar], tuple[int, ...]]:
     """Return sidecar -> its frames to bake; in a show an unedited shot has one stop."""
+    if every is not None and every < 1:
+        raise Palette4dError(f"found {Arg('every', every)}, expected a whole number of 1 or more")
 
     def choose(sidecar: _core.Sidecar) -> tuple[int, ...]:
         if stops and show and sidecar.edits.empty:
