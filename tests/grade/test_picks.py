@@ -131,8 +131,8 @@ def test_numbers_and_lists_of_any_kind_are_saved(
     document = document_of(monkeypatch, picture)
     one, half = np.int64(1), np.float32(0.5)
     document.pick(np.int64(0), pixel=np.array([10, 10]), box=one, to=np.array([0.1, 0.5, 0.2]))
-    document.add_area("p1", Area(0, [(6, 8), (7, 9)], 2))  # type: ignore[arg-type]
-    document.add_area("p1", Area(one, np.array([[6.5, 8], [7, 9]]), half))  # type: ignore[arg-type]
+    document.add_area("p1", Area(0, [(6, 8), (7, 9)], 2))
+    document.add_area("p1", Area(one, np.array([[6.5, 8], [7, 9]]), half))
     document.hold(0, pixel=[20, 10], box=3, start=one, fade=half)
     document.change_pick("p1", reach=half, lightness=np.array([0, 0.5]), enabled=np.bool_(True))
     document.set_window("p1", one, np.array([1, 2, 20, 18]), feather=half)
