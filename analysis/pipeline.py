@@ -151,7 +151,6 @@ def analyze(
     options = options or AnalysisOptions()
     clip = clip if isinstance(clip, Clip) else ArrayClip(clip)
     used = colour_space.spaces_of(clip, spaces or SpaceOptions())
-    stated_otherwise = [used.note] if used and used.note else []
     clip = colour_space.converted(clip, used)
     step = even_step(clip.frames)
     if not step:
@@ -216,7 +215,7 @@ def analyze(
         brightest=float(finished.vertices[:, :3].max()),
         linear=clip.encoding if says_linear(clip.encoding) else "",
     )
-    notes = [*clip.notes, *stated_otherwise]
+    notes = [*clip.notes, *([used.note] if used and used.note else [])]
     if skipped:
         notes.append(f"{counted(len(skipped), 'bad frame')} skipped: {describe(skipped)}")
     document["colours"] = clip_colours.clip_colours(usable)

@@ -304,7 +304,7 @@ def _opened(
 ) -> tuple[_core.Sidecar, bytes, Path | None]:
     """Return the core's view of a sidecar, its bytes, and its file."""
     if not isinstance(source, Document | SidecarBytes):
-        source = SidecarBytes(Path(source), sidecars.read_bytes(source))
+        source = SidecarBytes.of(Path(source))
     if isinstance(source, SidecarBytes):
         return source.parsed(), source.data, source.path
     fields = source.fields()

@@ -41,12 +41,7 @@ from palette4d.colour.ocio_config import BUILT_IN, config_of, failures
 from palette4d.common import sandbox
 from palette4d.common.child import Child
 from palette4d.common.errors import Arg, Palette4dError
-from palette4d.common.files import (
-    make_folder,
-    refuse_existing,
-    replace_by_link,
-    replacing,
-)
+from palette4d.common.files import make_folder, refuse_existing, replace_by_link, replacing
 from palette4d.common.text import checked_name, counted, file_safe
 from palette4d.jobs.workers import Workers
 from palette4d.media.clip_files import files_of_sidecar

@@ -545,6 +545,24 @@ class TestColourSpaces:
         assert sidecar(out, "rushes_s002") == before
         assert "conversion" not in sidecar(out, "rushes_s001")["clip"]
 
+    def test_shots_of_one_movie_have_configs_of_their_own(self, tmp_path: Path) -> None:
+        """Where clips are decoded by confined processes, these read the configs of all."""
+        take = movie(tmp_path / "media" / "take.mov", 30)
+        items = [clip(n, external(str(take)), at, 4) for n, at in (("A", 2), ("B", 12))]
+        path, out, folder = tmp_path / "edit.otio", tmp_path / "shots", tmp_path / "configs"
+        save(timeline(*items), path)
+        config = ocio.Config.CreateFromBuiltinConfig("ocio://studio-config-latest")
+        config.addColorSpace(ocio.ColorSpace(name="mine", encoding="sdr-video"))
+        folder.mkdir()
+        (folder / "own.ocio").write_text(config.serialize(), "utf-8")
+        words = [sys.executable, "-m", "palette4d", "analyze", str(path), "-o", str(out), *QUICK]
+        spaces = ("--input-space", "mine", "--palette-space", "ACEScct")
+        one = ["--only", "A", *spaces, "--ocio-config", str(folder / "own.ocio")]
+        for more in (one, ["--force"]):
+            done = subprocess.run([*words, *more], capture_output=True, text=True)
+            assert done.returncode == 0, done.stderr
+        assert [status for _, status, _ in shots(out)] == ["done", "done"]
+
     def test_an_unknown_space_fails_each_shot(
         self, cut_movie: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:

@@ -6,6 +6,8 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import PyOpenColorIO as ocio
@@ -17,7 +19,7 @@ from palette4d.lut_export.frame_edit import frame_edit
 
 from palette4d import Palette4dError, _core
 
-F32 = NDArray[np.float32]
+F32, F64 = NDArray[np.float32], NDArray[np.float64]
 EXTENSIONS = ["cc", "ccc", "cdl"]
 
 
@@ -47,6 +49,22 @@ def test_apply_is_opencolorios() -> None:
     got = cdl.apply(colours.reshape(-1, 3).astype(np.float64)).reshape(colours.shape)
     # OpenColorIO's fast power is good to some 1e-5.
     np.testing.assert_allclose(got, want, atol=5e-5)
+
+
+def test_what_no_picture_shows_is_no_nearer_than_what_it_shows() -> None:
+    """A turn of all hues leads below 0, where a CDL gets at the cost of other colours."""
+    axis = np.cross(np.eye(3), np.ones(3) / np.sqrt(3))
+    turn = np.eye(3) + np.sin(0.7) * axis + (1 - np.cos(0.7)) * axis @ axis
+    colours = np.random.default_rng(1).uniform((0, 0.3, 0.4), (0.3, 0.8, 0.95), (30, 30, 3))
+    points = colours.reshape(-1, 3)
+    wanted = np.maximum(points @ turn.T, 0)
+
+    def off(exact: Callable[[F64], F64]) -> float:
+        edit: Any = SimpleNamespace(identity=False, exact=exact)
+        got = fit(edit, colours.astype(np.float32)).apply(points)
+        return float((np.abs(np.maximum(got, 0) - wanted) / np.maximum(wanted, 0.1)).mean())
+
+    assert off(lambda p: p @ turn.T) <= off(lambda p: np.maximum(p @ turn.T, 0)) + 1e-6
 
 
 @pytest.mark.parametrize("extension", EXTENSIONS)

@@ -316,7 +316,8 @@ def render(
                 "movies"
             )
         # A frame that could not be read may be whole now.
-        sizes = [path.stat().st_size for path in map(clip.file, clip.frames) if path.is_file()]
+        files = dict.fromkeys(map(clip.file, clip.frames))
+        sizes = [path.stat().st_size for path in files if path.is_file()]
         shown = clip.frames, sizes, clip.skipped, fill
         by = made_by(document, clip, drawn, compare, space, codec, crf, sound, *shown)
         repeated = []

@@ -113,10 +113,12 @@ def analyse(
 
 def _files(tasks: Iterable[ShotTask]) -> list[Path]:
     """Return what the processes that analyse shots must read."""
-    configs = {task.clip: task.options.spaces.ocio_config for task in tasks}
-    files = [path for clip in configs for path in files_of(clip)]
-    named = dict.fromkeys(config or os.environ.get("OCIO") or "" for config in configs.values())
-    return files + [path for config in named for path in files_of_config(config)]
+    tasks = list(tasks)
+    clips = dict.fromkeys(task.clip for task in tasks)
+    asked = (task.options.spaces.ocio_config for task in tasks)
+    configs = dict.fromkeys(config or os.environ.get("OCIO") or "" for config in asked)
+    files = [path for clip in clips for path in files_of(clip)]
+    return files + [path for config in configs for path in files_of_config(config)]
 
 
 class Show:
