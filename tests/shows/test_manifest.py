@@ -55,6 +55,14 @@ def test_what_is_written_is_read_back(tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
+def test_a_reason_with_nul_is_read_as_it_is_written(tmp_path: Path) -> None:
+    path, copy = tmp_path / "x.shots.json", tmp_path / "y.shots.json"
+    path.write_text(text_of(path, lambda d: d["shots"][1].update(error="no\0 b")), "utf-8")
+    found = manifests.read(path)
+    manifests.write(found, copy)
+    assert manifests.read(copy) == found
+
+
 def test_the_sidecars_of_shots_that_are_done(tmp_path: Path) -> None:
     path = tmp_path / "x.shots.json"
     manifests.write(show(), path)

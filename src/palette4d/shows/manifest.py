@@ -205,7 +205,7 @@ def _entry(row: dict[str, Any]) -> Entry:
         shot=shot,
         status=row["status"],
         frames=(_whole(frames[0]), _whole(frames[1])) if frames else None,
-        error=_text(row.get("error", "")),
+        error=Message(_text(row.get("error", ""))),  # a file's NUL is no mark of an argument
         spaces={name: _text(row[name]) for name in SPACES if name in row},
     )
 
