@@ -1,6 +1,10 @@
 // What a frame shows, for Python: the picture, a matte, the palette below the picture.
+#include <array>
+#include <cstdint>
+#include <cstdlib>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <pybind11/stl.h>
@@ -31,12 +35,24 @@ Output output_from(const std::string& name) {
     return found->second;
 }
 
+/// The place of a picture in an image, x, y, width, height from the top, where y counts upwards.
+Area picture_in(const std::array<int, 4>& place, int height) {
+    constexpr int kMost = 1 << 24;  // sums stay far within int
+    const auto [x, y, wide, high] = place;
+    if (wide < 1 || high < 1 || wide > kMost || high > kMost || std::abs(std::int64_t{x}) > kMost ||
+        std::abs(std::int64_t{y}) > kMost) {
+        throw py::value_error(
+            "picture: expected x, y and a width and height of 1 or more, in pixels");
+    }
+    return {x, height - y - high, x + wide, height - y};
+}
+
 py::array draw(const py::array& image, const std::string& output,
                const std::shared_ptr<const Recolourer>& map, const py::object& original,
                const py::object& edited, double strength, double keep_lightness,
                const Vec3& lightness, double mix, bool matte_in_alpha, double outside_at,
-               double clean_up, bool premultiplied, int threads,
-               const ColourConversion* conversion) {
+               double clean_up, bool premultiplied, int threads, const ColourConversion* conversion,
+               const std::optional<std::array<int, 4>>& picture) {
     require_image(image, "image");
     if (threads < 0) throw py::value_error("threads: found less than 0, expected 0 or more");
     if (!(outside_at > 0)) throw py::value_error("outside_at: expected a number above 0");
@@ -62,6 +78,7 @@ py::array draw(const py::array& image, const std::string& output,
     py::array result = py::array_t<float>({image.shape(0), image.shape(1), image.shape(2)});
     const auto in_view = view_of<ConstImageView>(image, static_cast<const float*>(image.data()));
     const auto out_view = view_of<ImageView>(result, static_cast<float*>(result.mutable_data()));
+    if (picture) drawing.picture = picture_in(*picture, in_view.height);
     const Unlocked unlocked;
     draw_picture(in_view, out_view, drawing, premultiplied, threads);
     return result;
@@ -92,7 +109,7 @@ void bind_output(py::module_& module) {
                py::arg("lightness") = Vec3{0, 0, 0}, py::arg("mix") = 1.0,
                py::arg("matte_in_alpha") = false, py::arg("outside_at") = 0.05,
                py::arg("clean_up") = 1.0, py::arg("premultiplied") = false, py::arg("threads") = 1,
-               py::arg("conversion") = py::none(),
+               py::arg("conversion") = py::none(), py::arg("picture") = py::none(),
                "(h, w, 3 or 4) float32 in and out: what the node draws for a frame.");
     module.def("scope_counts", &scope_counts, py::arg("image"), py::kw_only(),
                py::arg("columns") = 480, py::arg("zoom") = 1.0, py::arg("threads") = 0,

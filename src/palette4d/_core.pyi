@@ -325,6 +325,7 @@ def draw(
     premultiplied: bool = ...,
     threads: int = ...,
     conversion: ColourConversion | None = ...,
+    picture: tuple[int, int, int, int] | None = ...,
 ) -> F32:
     """Return what the node draws for a frame, (h, w, 3 or 4) float32 as the image.
 

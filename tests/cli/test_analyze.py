@@ -11,12 +11,15 @@ import time
 from pathlib import Path
 
 import numpy as np
+import OpenImageIO as oiio
 import pytest
 from analysis_frames import mixture
 from clip_files import write_image
 from palette4d.analysis.options import OPTIONS
 
 from palette4d.cli import main
+from palette4d.grade.document import Document
+from palette4d.grade.picks import Area
 
 #: Without the search, where a test is not about it.
 STATIC = ("--quiet", "--method", "static")
@@ -138,6 +141,59 @@ def test_a_new_version_keeps_handles_and_grade(clip, tmp_path, capsys):
     fresh = tmp_path / "fresh.p4d.json"
     assert main.main(["analyze", str(clip), "-o", str(fresh), "--like", str(out)]) == 0
     assert f"edit {fresh} copy {out}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("frames", ["1001-1004", "1002-1006"])
+def test_edits_stay_at_their_frames_when_a_clip_gets_more(clip, tmp_path, frames):
+    """Frames that were added before or behind stretched all edits in time."""
+    out = tmp_path / "shot.p4d.json"
+    analyze = ["analyze", str(clip), "-o", str(out), "--quiet"]
+    assert main.main([*analyze, "--frames", frames]) == 0
+    edit = ["edit", str(out)]
+    when = ["--from", "1002", "--until", "1003", "--fade", "1"]
+    where = ["--frame", "1003", "--pixel", "5,4"]
+    assert main.main([*edit, "pick", *where, *when, "--to", "#305090"]) == 0
+    (before,) = Document.load(out).grade.picks
+    assert main.main([*analyze, "--keep-edits"]) == 0
+    (after,) = Document.load(out).grade.picks
+    for name in ("frame", "pixel", "start", "until", "fade"):
+        assert getattr(after, name) == getattr(before, name)
+    # A frame that is gone: the pick is where its colour is then.
+    assert main.main([*analyze, "--keep-edits", "--frames", "1004-1006"]) == 0
+    (later,) = Document.load(out).grade.picks
+    assert (later.frame, later.start, later.until) == (1004, 1002, 1003)
+
+
+def test_the_places_of_picks_go_along_to_a_larger_version(clip, tmp_path, capsys):
+    """A proxy's windows, boxes and areas lie at the same place of the full picture."""
+    out, large = tmp_path / "shot.p4d.json", tmp_path / "large"
+    assert main.main(["analyze", str(clip), "-o", str(out), "--quiet"]) == 0
+    edit = ["edit", str(out)]
+    where = ["--frame", "1003", "--pixel", "5,4", "--box", "3"]
+    window = ["--window", "2,1,12,9", "--feather", "2"]
+    assert main.main([*edit, "pick", *where, *window, "--to", "#305090"]) == 0
+    assert main.main([*edit, "version", "save", "kept"]) == 0
+    assert main.main([*edit, "area", "p1", "--frame", "1004", "--pixel", "7,3", "--box", "3"]) == 0
+    large.mkdir()
+    for path in clip.iterdir():
+        pixels = oiio.ImageBuf(str(path)).get_pixels(oiio.UINT8)
+        write_image(large / path.name, pixels.repeat(2, 0).repeat(2, 1))
+    capsys.readouterr()
+    again = ["analyze", str(large), "-o", str(out), "--quiet", "--like", str(out), "--keep-edits"]
+    assert main.main(again) == 0
+    assert "scaled with it" in capsys.readouterr().err
+    (pick,) = Document.load(out).grade.picks
+    assert (pick.pixel, pick.box) == ((11, 9), 6)
+    assert pick.window
+    assert pick.window.feather == 4
+    assert pick.window.given.keys[0].box == (4, 2, 24, 18)
+    assert pick.areas == (Area(1004, ((15, 7),), 3),)
+    # Steps and versions too.
+    assert main.main([*edit, "undo"]) == 0
+    (undone,) = Document.load(out).grade.picks
+    assert (undone.areas, undone.window) == ((), pick.window)
+    assert main.main([*edit, "version", "use", "kept"]) == 0
+    assert Document.load(out).grade.picks == (undone,)
 
 
 def test_bad_frames(clip, tmp_path, capsys):

@@ -17,7 +17,7 @@ from deliveries import render, tiles
 from palette4d.common.errors import WriteError
 from palette4d.grade import rendering
 from palette4d.grade.document import Document
-from palette4d.media import exr_around, exr_copy
+from palette4d.media import clip_base, exr_around, exr_copy
 from palette4d.media.clip import open_clip
 
 EDITED = Document.load(
@@ -100,6 +100,48 @@ def test_all_but_the_picture_is_kept(tmp_path):
         ).stdout
         for text in ("64 x   48", "worldToCamera", "coverage", "right.R", "pixel data origin"):
             assert text in told
+
+
+@pytest.mark.parametrize("origin", [(-8, -4), (6, 5)], ids=["overscan", "cropped"])
+@pytest.mark.parametrize("clean_up", [0.0, 1.0])
+def test_a_window_lies_in_the_display_window(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, origin: tuple[int, int], clean_up: float
+) -> None:
+    """Of EXR to EXR, where the whole data window is drawn; strips know their place as well."""
+    source = tmp_path / "c.0005.exr"
+    image = np.full((48, 40, 4), 0.5, np.float32)
+    names = ("R", "G", "B", "Z")
+    write_image(source, image, names=names, origin=origin, full=(0, 0, 48, 40))
+    fields = EDITED.fields()
+    fields["clip"]["size"] = [48, 40]
+    document = Document(fields)
+    document.reset()
+    document.pick(5, colour=(0.5, 0.5, 0.5), to=(0.9, 0.5, 0.5), whole_hue=True)
+    document.set_window("p1", 5, (12, 10, 30, 24), feather=1, follow=False)
+    rendering.render(document, source, tmp_path / "o.png", clean_up=clean_up)
+    shown = oiio.ImageBuf(str(tmp_path / "o.png")).get_pixels()
+    for large in (rendering.LARGE, 100):
+        monkeypatch.setattr(rendering, "LARGE", large)
+        monkeypatch.setattr(clip_base, "STRIP", 7 * 40)
+        rendering.render(document, source, tmp_path / "o.exr", clean_up=clean_up, force=True)
+        drawn = open_clip(tmp_path / "o.exr").read(0)
+        if clean_up == 0:
+            rows, columns = np.nonzero(drawn[..., 0] > 0.8)
+            assert (columns.min(), rows.min(), columns.max(), rows.max()) == (12, 10, 29, 23)
+        inside = drawn[..., 1] > 0
+        # The filter sees the overscan, too.
+        np.testing.assert_allclose(drawn[inside], shown[inside], atol=0.1 if clean_up else 0.01)
+
+
+@pytest.mark.parametrize("orientation", [3, 6])
+def test_a_turned_file_is_written_upright(tmp_path: Path, orientation: int) -> None:
+    source = tmp_path / "c.0005.exr"
+    image = np.random.default_rng(2).random((12, 20, 4)).astype(np.float32)
+    write_image(source, image, names=("R", "G", "B", "Z"), Orientation=orientation)
+    done = rendering.render(EDITED, source, tmp_path / "o.####.exr", strength=0)
+    assert any("not kept" in note for note in done.notes)
+    before, after = (open_clip(path).load(5).pixels for path in (source, tmp_path / "o.0005.exr"))
+    np.testing.assert_allclose(before, after, atol=1e-3)
 
 
 @pytest.mark.parametrize("half", [False, True])

@@ -360,14 +360,14 @@ void draw_picture(const ConstImageView& in, const ImageView& out, Drawing drawin
     const auto channels = static_cast<std::size_t>(in.channels);
     const std::size_t row = static_cast<std::size_t>(in.width) * channels;
     const auto row_bytes = static_cast<std::ptrdiff_t>(row * sizeof(float));
-    drawing.picture = {0, 0, in.width, in.height};
+    const Area whole{0, 0, in.width, in.height};
+    if (drawing.picture.x1 >= drawing.picture.x2) drawing.picture = whole;
     if (row == 0) return;
     const bool packed = in.row_bytes == row_bytes && out.row_bytes == row_bytes;
     const auto row_at = [&](int y) { return in.row(in.height - 1 - y); };  // y counts upwards
     const int cell = clean_up_cell(1, clip_lines(drawing));
-    if (const auto clean_up =
-            make_clean_up(drawing, {in.channels, premultiplied},
-                          {drawing.picture, drawing.picture, drawing.picture, cell, cell})) {
+    if (const auto clean_up = make_clean_up(drawing, {in.channels, premultiplied},
+                                            {drawing.picture, whole, whole, cell, cell})) {
         const unsigned processors = std::max(1u, std::thread::hardware_concurrency());
         const int strips = threads == 0 ? static_cast<int>(processors) : threads;
         clean_up->prepare([&](int y, int x1, int, float*) { return row_at(y) + x1 * in.channels; },

@@ -94,7 +94,8 @@ void draw_strip(float* row, int x1, int x2, int y, std::size_t channels, const D
 void mix_in_source(const Pixels& pixels, double mix, const std::vector<float>& mask);
 
 /// Draws a whole picture, whose first row is its top. `in` and `out` have the same size and
-/// channels, and do not overlap. Ignores drawing.picture; `threads` as in RecolourOptions.
+/// channels, and do not overlap. An empty drawing.picture is all of it, else what lies around is
+/// overscan; its y counts from the last row upwards. `threads` as in RecolourOptions.
 void draw_picture(const ConstImageView& in, const ImageView& out, Drawing drawing,
                   bool premultiplied, int threads);
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class _TimeAction(argparse.Action):
-    """Read "relative", or "frame" and a number."""
+    """Read "relative", "same", or "frame" and a number."""
 
     def __call__(
         self,
@@ -30,15 +30,15 @@ class _TimeAction(argparse.Action):
     ) -> None:
         words = [str(word) for word in values] if isinstance(values, list) else []
         try:
-            if words == ["relative"]:
-                setattr(namespace, self.dest, "relative")
+            if words in (["relative"], ["same"]):
+                setattr(namespace, self.dest, words[0])
             elif len(words) == 2 and words[0] == "frame":
                 setattr(namespace, self.dest, number()(words[1]))
             else:
                 raise argparse.ArgumentTypeError
         except argparse.ArgumentTypeError:
             raise argparse.ArgumentError(
-                self, f"found {' '.join(words)!r}, expected relative, or frame T"
+                self, f"found {' '.join(words)!r}, expected relative, same, or frame T"
             ) from None
 
 
@@ -46,7 +46,7 @@ def add_actions(action: Action) -> None:
     """Add the action to `edit`."""
     parser = action(
         "copy",
-        "SOURCE [--time relative | --time frame T] [--shots PATTERN]",
+        "SOURCE [--time relative | same | frame T] [--shots PATTERN]",
         "take over the grade of another palette. Each handle gets the colour that the other grade "
         "makes of its colour; picks are learned again in this clip. SIDECAR may be a show's "
         "NAME.shots.json: then all its shots get the grade. Former edits are kept as a version.",
@@ -59,7 +59,7 @@ def add_actions(action: Action) -> None:
         default="relative",
         metavar="WHEN",
         help="relative: first frame to first frame, last to last (default); "
-        "frame T: all frames get the look of frame T",
+        "same: frames of one number; frame T: all frames get the look of frame T",
     )
     parser.add_argument(
         "--shots",

@@ -29,7 +29,7 @@ from palette4d.grade.picks import Pick
 from palette4d.grade.versions import with_active_kept
 
 F64 = NDArray[np.float64]
-Time = Literal["relative"] | float
+Time = Literal["relative", "same"] | float
 Convert = Callable[[F64], F64]
 
 #: The edits that the handles' grade is made of.
@@ -119,14 +119,18 @@ class Match:
 
     def there(self, frame: float) -> float:
         """Return the source's time for a time of the target."""
-        if self.time != "relative":
+        if not isinstance(self.time, str):
             return float(self.time)
         first, last, _ = self.target.frames
         begin, end, _ = self.source.frames
+        if self.time == "same":
+            return min(max(frame, begin), end)
         return begin + (frame - first) * (end - begin) / max(last - first, 1)
 
     def back(self, frame: float) -> float:
-        """Return the target's time for a time of the source, with `time` "relative"."""
+        """Return the target's time for a time of the source, unless `time` is a frame."""
+        if self.time == "same":
+            return frame
         first, last, _ = self.target.frames
         begin, end, _ = self.source.frames
         return first + (frame - begin) * (last - first) / max(end - begin, 1)
@@ -215,10 +219,10 @@ def fit(target: Grade, source: Grade, time: Time = "relative") -> Fit:
 
 
 def _match(target: Grade, source: Grade, time: Time) -> Match:
-    if time != "relative":
-        if isinstance(time, str):
-            raise Palette4dError(f"found the time {time!r}, expected 'relative' or a frame")
+    if not isinstance(time, str):
         source.check_frame(time)
+    elif time not in ("relative", "same"):
+        raise Palette4dError(f"found the time {time!r}, expected 'relative', 'same' or a frame")
     return Match(target, source, time)
 
 
@@ -295,12 +299,25 @@ def _pick(match: Match, pick: Pick, same_clip: bool) -> Pick | None:
         copy = replace(copy, pixel=None, box=None, areas=(), window=None)
     if pick.to is not None:
         copy = replace(copy, to=colour(pick.to))
-    if match.time == "relative":
-        keys = {time(key.frame): key for key in pick.path}
+
+    def picked_at(moment: float) -> Pick:
+        rgb = pick.colour_at(moment)
+        if pick.to is not None and pick.toward == "shift":
+            return replace(copy, rgb=colour(rgb), to=colour(rgb + pick.change_at(moment)))
+        return replace(copy, rgb=colour(rgb))
+
+    if isinstance(match.time, str):
+        first, last, _ = match.target.frames
+        keys = {time(key.frame): key for key in pick.path if first <= time(key.frame) <= last}
+        frame = min(max(time(pick.frame), first), last)
+        if frame == time(pick.frame):
+            copy = replace(copy, rgb=colour(pick.rgb))
+        else:  # it was picked at a frame that is not in the target
+            copy = replace(picked_at(match.there(frame)), pixel=None, box=None)
         return replace(
             copy,
-            frame=time(pick.frame),
-            rgb=colour(pick.rgb),
+            frame=frame,
+            areas=tuple(area for area in copy.areas if first <= area.frame <= last),
             start=None if pick.start is None else time(pick.start),
             until=None if pick.until is None else time(pick.until),
             fade=pick.fade * match.pace,
@@ -311,10 +328,7 @@ def _pick(match: Match, pick: Pick, same_clip: bool) -> Pick | None:
     start, until = (moment if end is None else end for end in (pick.start, pick.until))
     if not start <= moment <= until:
         return None
-    rgb = pick.colour_at(moment)
-    if pick.to is not None and pick.toward == "shift":
-        copy = replace(copy, to=colour(rgb + pick.change_at(moment)))
-    return replace(copy, frame=match.target.frames[0], rgb=colour(rgb))
+    return replace(picked_at(moment), frame=match.target.frames[0])
 
 
 def _colours(target: Grade) -> Iterator[tuple[float, F64, F64]]:

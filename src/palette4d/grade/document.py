@@ -507,8 +507,9 @@ class Document:
         ----------
         source : Document
             The graded document.
-        time : "relative" or float
+        time : "relative", "same" or float
             "relative": the first frame gets the look of the first frame, the last that of the last.
+            "same": each frame gets the look of the frame of its number.
             A frame: all frames get the look of this frame of `source`.
         clip : path, optional
             This document's clip, which picks are learned from; default: the sidecar's.

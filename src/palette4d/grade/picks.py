@@ -234,6 +234,31 @@ class Pick:
             return self.areas
         return (Area(self.frame, (self.pixel,), (self.box or 1) / 2), *self.areas)
 
+    def scaled(self, x: float, y: float) -> Pick:
+        """Return the pick for a clip x times as wide and y times as high."""
+
+        def at(point: tuple[float, float]) -> tuple[float, float]:
+            return math.floor((point[0] + 0.5) * x), math.floor((point[1] + 0.5) * y)
+
+        mean, change = math.sqrt(x * y), dataclasses.replace
+        window = self.window and Window(
+            self.window.feather * mean,
+            tuple(
+                change(key, box=as_box(np.multiply(key.box, (x, y, x, y))))
+                for key in self.window.keys
+            ),
+        )
+        return change(
+            self,
+            pixel=self.pixel and at(self.pixel),
+            box=self.box and max(1, round(self.box * mean)),
+            areas=tuple(
+                change(area, points=tuple(map(at, area.points)), radius=area.radius * mean)
+                for area in self.areas
+            ),
+            window=window,
+        )
+
     def colour_at(self, frame: float) -> F64:
         """Return where the colour is at a frame, (3,)."""
         if not self.path:

@@ -2,9 +2,10 @@
 
 import itertools
 import os
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from palette4d.common import sandbox
 from palette4d.common.child import Child
@@ -13,7 +14,7 @@ from palette4d.common.files import link_target, replacing
 from palette4d.grade import sidecar
 from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.copying import copied
-from palette4d.grade.edits import Edit, difference
+from palette4d.grade.edits import Edit, Key, Kind, State, difference
 from palette4d.grade.grade import Grade
 from palette4d.grade.handle_edits import reset
 from palette4d.grade.members import Fields, history_of
@@ -23,6 +24,10 @@ from palette4d.media.clip_files import files_of
 
 #: `quality.options.method` of a palette that `analyze --like` moved.
 _MOVED = "like"
+_SCALED = (
+    "this clip has {}x{} pixels, the former one {}x{}: the places of picks, and their windows, are "
+    "scaled with it"
+)
 
 
 def save(
@@ -44,10 +49,14 @@ def save(
     former = Grade.of(*old[:2], target)
     new = Grade.of(sidecar.validate(fields, str(target)), fields, None)
     extra = fields.get("extra") or before["extra"]
-    if (moved := _with_same_handles(former, new)) is not None:
-        done, undone = history_of(before, str(target))
-        kept_fields = {**moved.fields(done, undone), "extra": extra}
-        return sidecar.save(kept_fields, target, on_edits="drop", replaces=read), []
+    own, other = (tuple(members["clip"]["size"]) for members in (fields, before))
+    by = own[0] / other[0], own[1] / other[1]
+    if (moved := _with_same_handles(former, new, by)) is not None:
+        steps = [_scaled_steps(part, by) for part in history_of(before, str(target))]
+        kept_fields = {**moved.fields(*steps), "extra": extra}
+        saved = sidecar.save(kept_fields, target, on_edits="drop", replaces=read)
+        places = any(pick.marks or pick.window for pick in former.picks)
+        return saved, [_SCALED.format(*own, *other)] if places and own != other else []
     if clip is not None and sandbox.of_command():
         with Child(reads=files_of(clip)) as child:
             copy, notes = child.call(_copied, read, fields, target, clip)
@@ -71,15 +80,16 @@ def _copied(
     analysed = new = Grade.of(sidecar.validate(fields, str(target)), fields, None)
     clip, notes = ClipOfPicks.of(new, given), []
     own, other = (grade.members["clip"] for grade in (new, former))
-    same = all(own[name] == other[name] for name in ("source", "size", "frames"))
+    time = _time(own, other)
+    same = own["source"] == other["source"] and own["size"] == other["size"]
     for name in former.versions:
         if (version := former.version(name)).edited:
-            new, _ = copied(new, version, clip, same_clip=same)
+            new, _ = copied(new, version, clip, time, same_clip=same)
         new, _ = save_version(new, name)
         new = set_note(new, name, former.note(name))
         new = reset(new)
     if former.edited:
-        new, fit = copied(new, former, clip, same_clip=same)
+        new, fit = copied(new, former, clip, time, same_clip=same)
         fit = replace(fit, nothing=False)  # the former edits do not stay here
         notes.append(f"the palette changed, so that the grade was copied: {fit}")
     name = "copy the grade of the former analysis"
@@ -88,17 +98,62 @@ def _copied(
     return new.fields(steps), notes
 
 
-def _with_same_handles(old: Grade, new: Grade) -> Grade | None:
-    """Return the new palette with the old edits, if `analyze --like` moved the old one to it."""
+def _time(own: Fields, other: Fields) -> Literal["relative", "same"]:
+    """Return how the frames of a new analysis correspond to the former ones.
+
+    A clip that got frames, or lost some, keeps the numbers of the others.
+    """
+    first, last, begin, end = (
+        clip["frames"][name] for clip in (own, other) for name in ("first", "last")
+    )
+    overlap = first <= end and begin <= last and last - first != end - begin
+    return "same" if own["source"] == other["source"] or overlap else "relative"
+
+
+def _with_same_handles(old: Grade, new: Grade, by: tuple[float, float]) -> Grade | None:
+    """Return the new palette with the old edits, if `analyze --like` moved the old one to it.
+
+    `by` is how many times as wide and as high its clip is.
+    """
     method = new.members.get("quality", {}).get("options", {}).get("method")
     if method != _MOVED or _handles(old.members) != _handles(new.members):
         return None
-    moved = new.with_mattes(old.mattes).with_state(old.state)
+    moved = new.with_mattes(old.mattes).with_state(_scaled(old.state, by))
     try:
         sidecar.validate(moved.fields())
     except SidecarError:  # a handle has moved in time beyond an edit
         return None
     return moved
+
+
+def _scaled(state: State, by: tuple[float, float]) -> dict[Key, Any]:
+    """Return a state whose picks have their places in a clip of another size."""
+    return {key: _scaled_value(key[0], value, by) for key, value in state.items()}
+
+
+def _scaled_value(kind: Kind, value: Any, by: tuple[float, float]) -> Any:
+    if value is None or by == (1, 1):
+        return value
+    if kind == "version":
+        return _scaled(value, by)
+    return value.scaled(*by) if kind == "pick" else value
+
+
+def _scaled_steps(steps: Iterable[Edit], by: tuple[float, float]) -> list[Edit]:
+    return [
+        replace(
+            step,
+            changes=tuple(
+                replace(
+                    change,
+                    before=_scaled_value(change.kind, change.before, by),
+                    after=_scaled_value(change.kind, change.after, by),
+                )
+                for change in step.changes
+            ),
+        )
+        for step in steps
+    ]
 
 
 def _handles(document: Fields) -> tuple[Any, ...]:

@@ -38,6 +38,9 @@ class Drawing(Matting, total=False):
         "palette": the image is in the palette's own colour space, not in the clip's.
     threads : int
         0: one per processor. The result does not depend on it.
+    picture : (x, y, width, height), optional
+        The clip's picture within the image, in pixels from the top left; what lies around is
+        overscan. All of the image by default. Windows of picks lie in it.
     """
 
     strength: float
@@ -47,6 +50,7 @@ class Drawing(Matting, total=False):
     show: str
     matte_in: Literal["picture", "alpha"]
     premultiplied: bool
+    picture: tuple[int, int, int, int] | None
 
 
 def recolour(grade: Grade, image: F32, frame: float, **how: Unpack[Drawing]) -> F32:
@@ -54,6 +58,7 @@ def recolour(grade: Grade, image: F32, frame: float, **how: Unpack[Drawing]) -> 
     drawing: dict[str, Any] = {**how}
     space = drawing.pop("space", "input")
     premultiplied, threads = drawing.pop("premultiplied", False), drawing.pop("threads", 0)
+    picture = drawing.pop("picture", None)
     output = Output(**drawing)
     pixels = _checked_image(image)
     palette = grade.palette(frame)
@@ -75,6 +80,7 @@ def recolour(grade: Grade, image: F32, frame: float, **how: Unpack[Drawing]) -> 
         premultiplied=premultiplied,
         threads=threads,
         conversion=conversion.steps if conversion else None,
+        picture=picture,
     )
 
 

@@ -45,6 +45,8 @@ Compare = Literal["wipe", "side"]
 #: needs 400 MB.
 LARGE = 16_000_000
 Missing = Literal["hold", "black", "error"]
+#: x, y, width and height of the clip's picture within an image.
+Place = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True)
@@ -178,14 +180,14 @@ class Painter:
             self.clip.skip(frame)
             return None
         source = with_alpha(image.pixels) if self.drawn.in_alpha else image.pixels
-        pixels = self._recoloured(source, frame)
+        pixels = self._recoloured(source, frame, image.around.picture if image.around else None)
         if self.compare is not None:
             pixels = compared(source, pixels, self.compare)
         painted = image, pixels
         self._last = None if self.large else painted
         return painted
 
-    def _recoloured(self, source: F32, frame: int) -> F32:
+    def _recoloured(self, source: F32, frame: int, place: Place | None) -> F32:
         """Recolour a frame; a large one strip by strip in its own memory, where that is the same.
 
         A filter of picks needs the whole picture, and so does one with its palette below.
@@ -193,12 +195,14 @@ class Painter:
         whole = self.drawn.kind == "palette" or self.compare is not None
         filtered = self.drawn.clean_up > 0 and bool(self.document.grade.picks)
         if not self.large or whole or filtered or isinstance(self.clip, ArrayClip):
-            return self._drawn(source, frame)
+            return self._drawn(source, frame, place)
+        x, y, width, height = place or (0, 0, source.shape[1], source.shape[0])
         for rows in strips(*source.shape[:2]):
-            source[rows] = self._drawn(source[rows], frame)
+            beside = x, y - rows.start, width, height
+            source[rows] = self._drawn(source[rows], frame, beside)
         return source
 
-    def _drawn(self, source: F32, frame: int) -> F32:
+    def _drawn(self, source: F32, frame: int, place: Place | None) -> F32:
         return self.document.recolour(
             source,
             frame,
@@ -206,6 +210,7 @@ class Painter:
             premultiplied=self.clip.premultiplied,
             space=self.space,
             threads=self.threads,
+            picture=place,
         )
 
     @property

@@ -51,11 +51,11 @@ class ImageClip(Clip):
 
     @property
     def separable(self) -> bool:
-        """Whether the picture can be replaced in its files: EXR, with channels of its own."""
+        """Whether the picture can be replaced in its files: EXR, upright, with its own channels."""
         first = next(iter(self.sequence.files.values()))
         header = read_header(first, "the first file", self.reading)
         exr = self.sequence.suffix.lower() == ".exr"
-        return exr and len(set(header.channels)) == len(header.channels)
+        return exr and header.is_upright and len(set(header.channels)) == len(header.channels)
 
     def file(self, frame: int) -> Path:
         """The file of a frame, whether it exists or not."""
@@ -74,9 +74,11 @@ class ImageClip(Clip):
 
     def load(self, frame: int) -> Image:
         """Read one frame; FrameError when it is missing, unreadable, or of another size."""
-        header, stored, orientation = self._read(frame)
-        pixels = _upright(_scaled(stored, header.bits), orientation)
-        around = Around(self.file(frame), header.part, header.channels)
+        header, stored, spec = self._read(frame)
+        pixels = _upright(_scaled(stored, header.bits), spec.get_int_attribute("Orientation", 1))
+        left, top = (spec.full_x - spec.x, spec.full_y - spec.y) if self.whole else (0, 0)
+        picture = left, top, header.width, header.height
+        around = Around(self.file(frame), header.part, header.channels, picture)
         return Image(frame, np.ascontiguousarray(pixels), header.metadata, around)
 
     def fills(self, frames: Sequence[int]) -> Iterator[tuple[int, Fill]]:
@@ -98,8 +100,8 @@ class ImageClip(Clip):
         binner.add(rows[..., :3], bits=bits)
         return True
 
-    def _read(self, frame: int) -> tuple[Header, NDArray[Any], int]:
-        """Header, (h, w, 3 or 4) stored samples, and the Exif orientation."""
+    def _read(self, frame: int) -> tuple[Header, NDArray[Any], Any]:
+        """Header, (h, w, 3 or 4) stored samples, and what OpenImageIO says of the file."""
         path, what = self._path(frame), f"frame {frame}"
         source, spec, chosen = opened(path, what, self.reading)
         header = header_of(spec, chosen, source.current_subimage())
@@ -116,7 +118,7 @@ class ImageClip(Clip):
             samples = samples[..., [channel - first for channel in chosen]]
         if not self.whole:
             samples = _in_display_window(samples, spec)
-        return header, samples, spec.get_int_attribute("Orientation", 1)
+        return header, samples, spec
 
     def _path(self, frame: int) -> Path:
         path = self.sequence.path(frame)

@@ -25,11 +25,13 @@ class Around:
     file : the file.
     part : number of the part that holds the picture.
     channels : names of its channels of red, green and blue, and perhaps of alpha.
+    picture : x, y, width and height of the display window within the pixels that were read.
     """
 
     file: Path
     part: int
     channels: tuple[str, ...]
+    picture: tuple[int, int, int, int]
 
 
 def described(spec: Any, chosen: list[int], parts: int) -> str:

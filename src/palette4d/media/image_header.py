@@ -45,12 +45,13 @@ _DEPTHS = {"uint": "uint32", "int": "int32"}
 class Header:
     """The properties that an image file states.
 
-    Width and height are upright. bits: the bits of a sample if fewer than its memory type has,
-    else 0. note: for the user, or "".
+    Width and height are upright; is_upright: the file is, too. bits: the bits of a sample if fewer
+    than its memory type has, else 0. note: for the user, or "".
     """
 
     width: int
     height: int
+    is_upright: bool
     has_alpha: bool
     premultiplied: bool
     bits: int
@@ -197,7 +198,8 @@ def _bits(spec: Any) -> int:
 def header_of(spec: Any, chosen: list[int], part: int) -> Header:
     """Return the header for the channels that are read."""
     width, height = spec.full_width, spec.full_height
-    if 5 <= spec.get_int_attribute("Orientation", 1) <= 8:
+    orientation = spec.get_int_attribute("Orientation", 1)
+    if 5 <= orientation <= 8:
         width, height = height, width
     has_alpha = len(chosen) == 4
     straight = bool(spec.get_int_attribute("oiio:UnassociatedAlpha", 0))
@@ -206,6 +208,7 @@ def header_of(spec: Any, chosen: list[int], part: int) -> Header:
     return Header(
         width=width,
         height=height,
+        is_upright=not 2 <= orientation <= 8,
         has_alpha=has_alpha,
         premultiplied=has_alpha and not straight,
         bits=bits,
