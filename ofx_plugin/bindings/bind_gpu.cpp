@@ -56,7 +56,7 @@ py::tuple table(const std::shared_ptr<const Recolourer>& map, const std::string&
     if (!problem.empty()) throw py::value_error("the kernel cannot draw " + problem);
     const Area picture{0, 0, size[1], size[0]};
     const int cell = clean_up_cell(1, clip_lines(drawing));
-    const CleanUp::Place place{picture, picture, picture, cell, cell};
+    const CleanUp::Place place{picture, picture, picture, picture, cell, cell};
     const gpu::FrameTable made = gpu::frame_table(drawing, premultiplied, &place);
     const auto array = [](const std::vector<float>& values) {
         return py::array_t<float>(static_cast<py::ssize_t>(values.size()), values.data());

@@ -171,7 +171,7 @@ void add_window(const std::optional<FrameWindow>& window, const FramePicks& pick
         for (const double value : {-kFar, -kFar, kFar, kFar, 1.0, 1.0}) to.number(value);
         return;
     }
-    const ImagePlace at = image_place(place->picture, place->drawn.x1, place->drawn.y1, 1, picks);
+    const ImagePlace at = image_place(place->clip, place->drawn.x1, place->drawn.y1, 1, picks);
     const auto x = [&](float side) { return side / at.width - static_cast<double>(at.column); };
     const auto y = [&](float side) { return static_cast<double>(at.row) + 1 - side / at.height; };
     const auto& [left, top, right, bottom] = window->box;

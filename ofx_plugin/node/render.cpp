@@ -83,12 +83,51 @@ struct Copied {
 
 Area area_of(const OfxRectI& rect) { return {rect.x1, rect.y1, rect.x2, rect.y2}; }
 
+/// Where the clip's picture is, in which windows of picks lie. A host may hand over more of a file
+/// (overscan) or less (an element in its bounding box): if the project alone has the clip's size,
+/// that is where its picture is.
+Area clip_area(const Suites& suites, OfxImageEffectHandle effect, const OfxRectI& definition,
+               const Scale& scale, const Drawing& drawing) {
+    const Recolourer* const map = drawing.reader ? drawing.reader.get() : drawing.edit.get();
+    OfxPropertySetHandle handle = nullptr;
+    if (!map || !map->picks().windows() || !suites.effect->getPropertySet ||
+        suites.effect->getPropertySet(effect, &handle) != kOfxStatOK) {
+        return area_of(definition);
+    }
+    const Properties properties(suites, handle);
+    const auto pixels = [&](const char* name, int index, double by) {
+        const double value = properties.get_double(name, index).value_or(0) * by;
+        return std::isfinite(value) && std::abs(value) < 1e6 ? std::lround(value) : 0L;
+    };
+    const double aspect =
+        properties.get_double(kOfxImageEffectPropProjectPixelAspectRatio).value_or(1);
+    const double x = scale.x / (aspect > 0 ? aspect : 1), y = scale.y;
+    const long width = pixels(kOfxImageEffectPropProjectSize, 0, x);
+    const long height = pixels(kOfxImageEffectPropProjectSize, 1, y);
+    const double own_width = map->picks().width, own_height = map->picks().height;
+    const auto has_its_size = [&](long w, long h) {
+        return std::abs(own_width * scale.x - static_cast<double>(w)) <= 1 &&
+               std::abs(own_height * scale.y - static_cast<double>(h)) <= 1;
+    };
+    if (has_its_size(long{definition.x2} - definition.x1, long{definition.y2} - definition.y1) ||
+        !has_its_size(width, height)) {
+        return area_of(definition);
+    }
+    const int left = static_cast<int>(pixels(kOfxImageEffectPropProjectOffset, 0, x));
+    const int bottom = static_cast<int>(pixels(kOfxImageEffectPropProjectOffset, 1, y));
+    return {left, bottom, left + static_cast<int>(width), bottom + static_cast<int>(height)};
+}
+
 /// Where a window of a source is cleaned up.
 CleanUp::Place clean_up_place(const Image& in, const OfxRectI& window, const Scale& scale,
                               const Drawing& drawing) {
     const double lines = clip_lines(drawing);
-    return {area_of(in.definition), area_of(in.bounds), area_of(window),
-            clean_up_cell(scale.x, lines), clean_up_cell(scale.y, lines)};
+    return {area_of(in.definition),
+            area_of(in.bounds),
+            area_of(window),
+            drawing.picture,
+            clean_up_cell(scale.x, lines),
+            clean_up_cell(scale.y, lines)};
 }
 
 /// Filters what picks do in the window. The source should reach regions_of_interest() beyond it;
@@ -242,7 +281,7 @@ Plan plan_of(const Suites& suites, OfxImageEffectHandle effect, const Properties
     report(suites, effect, setup.problem.empty() ? setup.note : setup.problem);
     // Alpha-only pictures pass through too.
     if (setup.passes || pictures.in->channels < 3) return plan.with(Action::kCopy);
-    setup.drawing.picture = area_of(whole);
+    setup.drawing.picture = clip_area(suites, effect, whole, scale_of(in_args), setup.drawing);
     // A host that bakes a LUT wants colours only, so no mattes and no strip.
     if (in_args.get_string(kOfxImageEffectPropNoSpatialAwareness) == "true") {
         setup.drawing.options.clean_up = 0;

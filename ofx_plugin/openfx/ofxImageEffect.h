@@ -66,6 +66,9 @@ typedef struct OfxImageMemoryStruct* OfxImageMemoryHandle;
 #define kOfxImageEffectRenderInstanceSafe "OfxImageEffectRenderInstanceSafe"
 #define kOfxImageEffectRenderFullySafe "OfxImageEffectRenderFullySafe"
 #define kOfxImageEffectPropClipPreferencesSlaveParam "OfxImageEffectPropClipPreferencesSlaveParam"
+#define kOfxImageEffectPropProjectSize "OfxImageEffectPropProjectSize"
+#define kOfxImageEffectPropProjectOffset "OfxImageEffectPropProjectOffset"
+#define kOfxImageEffectPropProjectPixelAspectRatio "OfxImageEffectPropPixelAspectRatio"
 
 /* Of its clips and their images */
 #define kOfxImageEffectOutputClipName "Output"

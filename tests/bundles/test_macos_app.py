@@ -65,7 +65,7 @@ def test_its_environment_finds_its_packages(app: Path) -> None:
     assert str(program.readlink()) == f"{FRAMEWORK}/python3.13"
     settings = home / "pyvenv.cfg"
     assert f"home = {FRAMEWORK}\n" in settings.read_text()
-    script = "import fileseq, sys; print(fileseq.__file__); print(sys.executable)"
+    script = "import cycler, sys; print(cycler.__file__); print(sys.executable)"
     base = Path(sys.base_prefix, "bin")
     settings.write_text(settings.read_text().replace(FRAMEWORK, str(base)))
     program.unlink()

@@ -146,22 +146,65 @@ def test_a_new_version_keeps_handles_and_grade(clip, tmp_path, capsys):
 @pytest.mark.parametrize("frames", ["1001-1004", "1002-1006"])
 def test_edits_stay_at_their_frames_when_a_clip_gets_more(clip, tmp_path, frames):
     """Frames that were added before or behind stretched all edits in time."""
+    halves = np.where(np.arange(16)[None, :, None] < 8, [200, 40, 40], [90, 90, 95])
+    for i, path in enumerate(sorted(clip.iterdir())):
+        write_image(path, (halves + i).repeat(12, 0).astype(np.uint8))
     out = tmp_path / "shot.p4d.json"
     analyze = ["analyze", str(clip), "-o", str(out), "--quiet"]
     assert main.main([*analyze, "--frames", frames]) == 0
-    edit = ["edit", str(out)]
     when = ["--from", "1002", "--until", "1003", "--fade", "1"]
-    where = ["--frame", "1003", "--pixel", "5,4"]
-    assert main.main([*edit, "pick", *where, *when, "--to", "#305090"]) == 0
+    pick = ["pick", "--frame", "1003", "--pixel", "3,4", *when, "--to", "#305090"]
+    assert main.main(["edit", str(out), *pick]) == 0
     (before,) = Document.load(out).grade.picks
     assert main.main([*analyze, "--keep-edits"]) == 0
     (after,) = Document.load(out).grade.picks
-    for name in ("frame", "pixel", "start", "until", "fade"):
+    for name in ("frame", "pixel", "start", "until", "fade", "rgb"):
         assert getattr(after, name) == getattr(before, name)
-    # A frame that is gone: the pick is where its colour is then.
+    # Where the picked frame is gone, its colour is picked at the nearest one.
     assert main.main([*analyze, "--keep-edits", "--frames", "1004-1006"]) == 0
     (later,) = Document.load(out).grade.picks
     assert (later.frame, later.start, later.until) == (1004, 1002, 1003)
+    assert later.rgb == pytest.approx(np.array([203, 43, 43]) / 255, abs=1e-4)
+
+
+def test_picks_stay_at_their_places_in_a_clip_that_moved(clip, tmp_path, capsys):
+    """There are two red things: the larger one is not the picked one."""
+    things = np.full((12, 32, 3), [90, 90, 95])
+    things[2:5, 2:6], things[2:5, 6:8], things[6:, 14:] = (
+        [200, 40, 40],
+        [210, 140, 140],
+        [190, 45, 40],
+    )
+    for i, path in enumerate(sorted(clip.iterdir())):
+        write_image(path, (things + i).astype(np.uint8))
+    out = tmp_path / "shot.p4d.json"
+    static = ["-o", str(out), *STATIC]
+    assert main.main(["analyze", str(clip), *static]) == 0
+    edit = ["edit", str(out)]
+    window = ["--window", "0,0,10,7", "--no-follow"]
+    pick = ["pick", "--frame", "1002", "--pixel", "3,3", "--to", "#305090", *window]
+    assert main.main([*edit, *pick]) == 0
+    assert main.main([*edit, "area", "p1", "--frame", "1002", "--pixel", "6,3"]) == 0
+    assert main.main([*edit, "version", "save", "kept"]) == 0
+    (before,) = Document.load(out).grade.picks
+    moved = clip.rename(tmp_path / "elsewhere")
+    again = ["--keep-edits", "--set", "colours=500"]
+    assert main.main(["analyze", str(moved), *static, *again, "--set", "palette_size=5"]) == 0
+    document = Document.load(out)
+    for (after,) in (document.grade.picks, document.version("kept").grade.picks):
+        for name in ("pixel", "areas", "window", "rgb"):
+            assert getattr(after, name) == getattr(before, name)
+    # Where the thing is no longer there, its colour is looked for, and that is said.
+    things[2:5, 2:8] = [60, 160, 60]
+    for path in moved.iterdir():
+        write_image(path, things.astype(np.uint8))
+    capsys.readouterr()
+    assert main.main(["analyze", str(moved), *static, *again, "--set", "palette_size=6"]) == 0
+    said = capsys.readouterr().err
+    assert "version kept; picked where their colour is" in said
+    assert said.count("without a window, since") == 2
+    (after,) = Document.load(out).grade.picks
+    assert after.pixel[0] > 12
 
 
 def test_the_places_of_picks_go_along_to_a_larger_version(clip, tmp_path, capsys):

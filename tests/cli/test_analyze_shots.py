@@ -301,6 +301,30 @@ class TestAgain:
         assert analyze(edit, out, "--only", "tke") == 1
         assert "--only: there is no shot 'tke'; expected names such as" in capsys.readouterr().err
 
+    def test_shots_of_one_clip_keep_their_names_and_grades(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        """Wherever the editor puts them, and if he trims them."""
+        take, out = movie(tmp_path / "take.mov", 30), tmp_path / "shots"
+
+        def run(*events: tuple[int, int]) -> dict[str, Any]:
+            items = [clip("A", external(str(take)), first, count) for first, count in events]
+            path = save(timeline(*items), tmp_path / "edit.otio")
+            assert analyze(path, out, "--keep-edits") == 0
+            return {shot["name"]: shot["used"] for shot in manifest(out)["shots"]}
+
+        assert run((2, 4), (12, 4)) == {"A": [2, 5], "A_f12": [12, 15]}
+        recolour(out / "A_f12.p4d.json")
+        before = (out / "A_f12.p4d.json").read_bytes()
+        assert run((12, 4), (2, 4), (22, 4)) == {"A_f12": [12, 15], "A": [2, 5], "A_f22": [22, 25]}
+        assert (out / "A_f12.p4d.json").read_bytes() == before
+        assert run((13, 4), (2, 4)) == {"A_f12": [13, 16], "A": [2, 5]}
+        assert Document.load(out / "A_f12.p4d.json").grade.edited
+        assert "no longer" not in capsys.readouterr().err
+        assert run((2, 4)) == {"A": [2, 5]}
+        assert "1 graded shot is no longer in the edit" in capsys.readouterr().err
+        assert Document.load(out / "A_f12.p4d.json").grade.edited
+
     def test_shots_that_are_not_named_stay_as_they_were(
         self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:

@@ -329,6 +329,14 @@ def test_folders_that_cannot_be_written_are_named(tmp_path):
             write_frame(tmp_path / "locked" / "o.png", colours(2, 2, 3), "uint8")
 
 
+def test_frames_beside_an_opened_clip_are_refused(tmp_path):
+    grey_levels(tmp_path / "in", range(4))
+    clip = open_clip(str(tmp_path / "in"), frames="1-2")
+    with pytest.raises(Palette4dError, match="beside an opened clip"):
+        rendering.render(PLAIN, clip, tmp_path / "o.#.png", frames="2")
+    assert rendering.render(PLAIN, clip, tmp_path / "o.#.png").frames == [1, 2]
+
+
 def test_output_names():
     assert FramePattern.parse("a/b.####.exr").path(7) == Path("a/b.0007.exr")
     assert FramePattern.parse("a/b.%04d.exr").path(-7) == Path("a/b.-007.exr")

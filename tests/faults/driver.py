@@ -29,7 +29,7 @@ LEFT_OUT = ("palette4d.studio", "palette4d.__main__", "palette4d.common.windows"
 for found in pkgutil.walk_packages(palette4d.__path__, "palette4d."):
     if not found.name.startswith(LEFT_OUT):
         importlib.import_module(found.name)
-for name in ("OpenImageIO", "PyOpenColorIO", "fileseq", "opentimelineio", "matplotlib.figure"):
+for name in ("OpenImageIO", "PyOpenColorIO", "opentimelineio", "matplotlib.figure"):
     importlib.import_module(name)
 
 FORKS = multiprocessing.get_context("fork")

@@ -331,3 +331,27 @@ class TestAgain:
         with pytest.raises(SystemExit) as ended:
             self.run(PLAIN, tmp_path, "-o", tmp_path / "o.mov", *words)
         assert ended.value.code == 2
+
+
+@pytest.mark.parametrize("broken", [True, False])
+def test_a_pick_is_learned_without_a_bad_frame(tmp_path: Path, broken: bool) -> None:
+    """Frame 5 is one of those that a pick learns from, beside its own."""
+    halves = np.where(np.arange(24)[None, :, None] < 12, [200, 40, 40], [90, 90, 95])
+    for frame in range(1, 9):
+        pixels = (halves + frame).repeat(16, 0).astype(np.uint8)
+        write_image(tmp_path / "clip" / f"g.{frame:04d}.png", pixels)
+    bad = tmp_path / "clip" / "g.0005.png"
+    if broken:
+        bad.write_bytes(b"no picture")
+    else:
+        bad.unlink()
+    out = tmp_path / "g.p4d.json"
+    analyze = ["analyze", str(tmp_path / "clip"), "-o", str(out), "--quiet"]
+    assert main.main([*analyze, "--method", "static", "--skip-bad-frames"]) == 0
+    pick = ["pick", "--pixel", "5,8", "--to", "#3060b0"]
+    assert main.main(["edit", str(out), *pick, "--frame", "2"]) == 0
+    assert main.main(["edit", str(out), *pick, "--frame", "5"]) == 1  # it cannot be seen
+    document = Document.load(out)
+    red = np.array([[[201, 41, 41]]], np.float32) / 255
+    moved = document.recolour(red, 2)[0, 0]
+    assert moved == pytest.approx(np.array([0x30, 0x60, 0xB0]) / 255, abs=0.03)

@@ -156,7 +156,7 @@ def test_another_pixel_without_a_box_is_that_pixel(monkeypatch: pytest.MonkeyPat
     # Another palette takes the pick over with its box.
     pick = document.change_pick("p1", pixel=(20, 10), box=5)
     other = replace(pick, rgb=(0, 0, 0), path=())
-    grade, _ = pick_edits.taken(document.grade, ClipOfPicks.of(document.grade), [other])
+    grade, *_ = pick_edits.taken(document.grade, ClipOfPicks.of(document.grade), [other])
     taken = grade.pick("p1")
     assert (taken.rgb, taken.path) == (pick.rgb, pick.path)
     assert taken.rgb == pytest.approx((0.4, 0.4, 0.4), abs=0.04)

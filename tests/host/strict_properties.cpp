@@ -37,7 +37,10 @@ const std::map<std::string, Rule>& rules() {
         {"NatronOfxHostIsNatron", {kInt, 1, kHost, 0}},  // its own
         {kOfxPluginPropFilePath, {kString, 1, kEffectDescriptor, 0}},
         {"OfxImageEffectPropSrcFilePath", {kString, 1, kEffect, 0}},  // Resolve's
-        {"OfxImageEffectPropSrcFrame", {kInt, 1, kInArgs, 0}},        // likewise
+        {kOfxImageEffectPropProjectSize, {kDouble, 2, kEffect, 0}},
+        {kOfxImageEffectPropProjectOffset, {kDouble, 2, kEffect, 0}},
+        {kOfxImageEffectPropProjectPixelAspectRatio, {kDouble, 1, kEffect, 0}},
+        {"OfxImageEffectPropSrcFrame", {kInt, 1, kInArgs, 0}},  // likewise
         {kOfxPropTime, {kDouble, 1, kInArgs | kOutArgs, kOutArgs}},
         {kOfxPropIsInteractive, {kInt, 1, kEffect | kInArgs, 0}},
         {kOfxPropChangeReason, {kString, 1, kInArgs, 0}},

@@ -84,6 +84,50 @@ TEST(picks_are_cleaned_up_as_in_a_file) {
     }
 }
 
+/// A part of a picture as a picture of its own.
+Picture cropped(const Picture& from, const OfxRectI& bounds, double scale) {
+    Layout layout = from.layout();
+    layout.bounds = bounds;
+    layout.scale = scale;
+    Picture part(layout);
+    for (int y = bounds.y1; y < bounds.y2; ++y) {
+        std::memcpy(part.at(bounds.x1, y), from.at(bounds.x1, y),
+                    static_cast<std::size_t>(layout.width() * layout.pixel_bytes()));
+    }
+    return part;
+}
+
+TEST(windows_lie_in_the_project_where_it_alone_has_the_clips_size) {
+    for (const double scale : {1.0, 0.5}) {
+        Picked node;
+        node.set("cleanUp", 0.0);
+        auto& properties = node.instance->effect().properties;
+        const OfxRectI clip = scale == 1 ? rect(3, -2, 67, 46) : rect(2, -1, 34, 23);
+        const Picture all = scene_of(large(rect(-10, -9, 90, 80)));
+        const Picture part = cropped(all, clip, scale);
+        Picture reference(part.layout());
+        CHECK(node.instance->render(2, &part, reference, clip) == kOfxStatOK);
+        properties.put_all(kOfxImageEffectPropProjectSize, {128.0, 48.0});
+        properties.put_all(kOfxImageEffectPropProjectOffset,
+                           {2 * clip.x1 / scale, clip.y1 / scale});
+        properties.put(kOfxImageEffectPropProjectPixelAspectRatio, 2.0);
+        // Overscan, and an element in its bounding box.
+        for (const OfxRectI& bounds : {rect(-10, -9, 90, 80), rect(5, 1, 30, 20)}) {
+            const Picture source = cropped(all, bounds, scale);
+            Picture drawn(source.layout());
+            CHECK(node.instance->render(2, &source, drawn, bounds) == kOfxStatOK);
+            const OfxRectI both = {std::max(bounds.x1, clip.x1), std::max(bounds.y1, clip.y1),
+                                   std::min(bounds.x2, clip.x2), std::min(bounds.y2, clip.y2)};
+            CHECK(drawn.pixels(both) == reference.pixels(both));
+            // A project of another size says nothing.
+            properties.put_all(kOfxImageEffectPropProjectSize, {1920.0, 1080.0});
+            CHECK(node.instance->render(2, &source, drawn, bounds) == kOfxStatOK);
+            CHECK(drawn.pixels(both) != reference.pixels(both));
+            properties.put_all(kOfxImageEffectPropProjectSize, {128.0, 48.0});
+        }
+    }
+}
+
 TEST(tiles_with_their_region_of_interest_are_the_whole_picture) {
     for (const bool moves : {false, true}) {
         Picked node(moves);

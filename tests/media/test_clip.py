@@ -20,7 +20,7 @@ from palette4d.common.errors import Palette4dError
 from palette4d.media.clip import ClipError, FrameError, open_clip
 from palette4d.media.clip_base import as_rate, describe
 from palette4d.media.clip_sequence import frame_number
-from palette4d.media.frame_writer import write_frame
+from palette4d.media.frame_writer import FramePattern, write_frame
 from palette4d.media.timecode import start_timecode
 
 
@@ -59,7 +59,7 @@ def test_huge_frame_range_is_refused():
         parse_frames("1-99999999999")
 
 
-@pytest.mark.parametrize("frames", ["1-99999999999", "1-9999999x2,1-9999999y3"])
+@pytest.mark.parametrize("frames", ["1-99999999999", "1-9999999x2,1-9999999x3"])
 def test_a_pattern_with_a_huge_range_is_refused(tmp_path, frames):
     write_image(tmp_path / "a.1.png", np.zeros((1, 1, 3), np.uint8))
     with pytest.raises(Palette4dError, match="own range holds more than 1000000 frames"):
@@ -112,6 +112,31 @@ def test_every_pattern_finds_the_sequence(tmp_path, pattern):
     assert (clip.rate, clip.step, clip.encoding, clip.has_alpha) == (24, 1, "sRGB", False)
     assert reds(clip) == {frame: frame for frame in clip.frames}
     assert round(float(clip.read(1003)[0, 0, 0]) * 65535) == 1003
+
+
+@pytest.mark.parametrize(
+    "prefix",
+    [
+        "sh010-",
+        "A001-C002-",
+        "2026-11-28-",
+        "take2_",
+        "take#2_",
+        "a1,",
+        "x%d_",
+        "$F",
+        "a.1-5.",
+    ],
+)
+def test_a_sequence_is_found_again_by_its_source(tmp_path, prefix):
+    """Digits and marks in front of the number are not taken for a range."""
+    for frame in (1, 2, 3):
+        write_image(tmp_path / f"{prefix}{frame:04}.png", np.zeros((4, 4, 3), np.uint8))
+    clip = open_clip(str(tmp_path))
+    again = open_clip(clip.source)
+    assert again.frames == clip.frames == [1, 2, 3]
+    assert again.source == clip.source
+    assert FramePattern.parse(clip.source).path(2) == tmp_path / f"{prefix}0002.png"
 
 
 @pytest.mark.parametrize(

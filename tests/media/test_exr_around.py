@@ -133,6 +133,26 @@ def test_a_window_lies_in_the_display_window(
         np.testing.assert_allclose(drawn[inside], shown[inside], atol=0.1 if clean_up else 0.01)
 
 
+def test_later_frames_keep_what_the_first_has_not(tmp_path: Path) -> None:
+    image = np.random.default_rng(2).random((12, 20, 4)).astype(np.float32)
+    write_image(tmp_path / "c.0001.exr", image[..., :3])
+    write_image(tmp_path / "c.0002.exr", image, names=("R", "G", "B", "Z"))
+    write_image(tmp_path / "c.0003.exr", image[..., :3], origin=(-2, -1), full=(0, 0, 20, 12))
+    whole, part = tmp_path / "whole.####.exr", tmp_path / "part.####.exr"
+    rendering.render(EDITED, tmp_path / "c.####.exr", whole)
+    rendering.render(EDITED, tmp_path / "c.####.exr", part, frames="2-3")
+    for frame in (2, 3):
+        (before,), (after,) = (
+            parts(tmp_path / f"{name}.000{frame}.exr") for name in ("c", "whole")
+        )
+        assert set(after.channels) == set(before.channels)
+        for window in ("dataWindow", "displayWindow"):
+            np.testing.assert_array_equal(after.header[window], before.header[window])
+        (again,) = parts(tmp_path / f"part.000{frame}.exr")
+        for name, channel in after.channels.items():
+            np.testing.assert_array_equal(again.channels[name].pixels, channel.pixels)
+
+
 @pytest.mark.parametrize("orientation", [3, 6])
 def test_a_turned_file_is_written_upright(tmp_path: Path, orientation: int) -> None:
     source = tmp_path / "c.0005.exr"

@@ -122,6 +122,20 @@ def test_the_matrix_of_an_untagged_movie(tmp_path):
     assert any("matrix=601 is not used" in note for note in clip.notes)
 
 
+def test_a_proxy_need_not_be_read_as_the_clip_is(tmp_path):
+    """A layer's proxy may be a movie, or an EXR with that layer alone."""
+    layers(tmp_path / "c.0003.exr")
+    sidecar = tmp_path / "c.p4d.json"
+    analyze(read_as(str(tmp_path / "c.0003.exr"), layer="diffuse"), method="static").save(sidecar)
+    write_image(tmp_path / "p.0003.exr", np.full((4, 6, 3), 0.2, np.float32))
+    write_image(tmp_path / "p.0003.png", np.full((4, 6, 3), 50, np.uint8))
+    for name in ("p.0003.png", "p.0003.exr?layer="):
+        done = rendering.render(sidecar, tmp_path / name, tmp_path / "o.png", force=True)
+        assert done.frames == [3]
+    with pytest.raises(ClipError, match=r"no layer 'diffuse'.*\?layer= is the main layer"):
+        rendering.render(sidecar, tmp_path / "p.0003.exr", tmp_path / "o.png", force=True)
+
+
 def test_a_sidecar_remembers_how_its_clip_is_read(tmp_path):
     source = movie(tmp_path / "s.mp4", list(tiles(3, (64, 64))))
     document = analyze(f"{source}?matrix=709", allow_cuts=True, vertices=8)

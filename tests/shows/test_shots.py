@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,20 @@ def test_names_are_unlike_and_stay() -> None:
     # Another shot in between leaves the names of the others alone.
     more, _ = shots.numbered([shot("A"), shot("A", 3), shot("a", 5), shot("B")])
     assert [one.name for one in more] == ["A", "A_f3", "a_f5", "B"]
+
+
+def test_names_of_an_earlier_run_stay_with_their_frames() -> None:
+    former = {"A": (0, 9), "a_f20": (20, 29), "A_f40": (40, 49), "A_f3": (3, 4), "B": (0, 9)}
+
+    def names(*firsts: int) -> list[str]:
+        listed = [dataclasses.replace(shot("A", at), used=(at, at + 9)) for at in firsts]
+        return [one.name for one in shots.numbered(listed, former)[0]]
+
+    assert names(40, 20, 0) == ["A_f40", "a_f20", "A"]
+    # The same frames go before those that share some; most of them before fewer.
+    assert names(21, 20, 45, 42) == ["A", "a_f20", "A_f45", "A_f40"]
+    # One of other frames may have a name that is free.
+    assert names(70, 80) == ["A", "A_f80"]
 
 
 def test_a_movie_is_split_at_its_cut(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from palette4d.colour.oklch import Lch
 from palette4d.studio import theme
 from palette4d.studio.inspector import Inspector
 from palette4d.studio.session import Session
+from palette4d.studio.states import Place
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
 LATER = 1e9
@@ -191,6 +192,20 @@ def test_reset(qtbot: Any, panel: Inspector) -> None:
     panel.boxes["R"].setValue(0.5)
     qtbot.mouseClick(panel.reset, LEFT)
     assert colour(panel) == (0.9, 0.1, 0.1)
+
+
+def test_a_pixel_has_the_colour_that_windows_of_picks_give_it(panel: Inspector) -> None:
+    session = panel.session
+    assert session.document is not None
+    seen = session.document.grade.palette(session.frame).rgb.mean(axis=0)
+    session.edit(lambda d: d.pick(session.frame, colour=seen, by=(0.2, 0, 0), whole_hue=True))
+    session.edit(lambda d: d.set_window("p1", session.frame, (2, 2, 9, 9), feather=1, follow=False))
+    for at, moved in ((5, 0.2), (60, 0.0)):
+        session.begin_pick(Place(int(session.frame), at, 5, 1, tuple(seen.tolist())))
+        panel.refresh()
+        assert panel.target is not None
+        assert panel.target.after - seen == pytest.approx([moved, 0, 0], abs=0.02)
+        session.take("")
 
 
 def test_nothing_selected_says_what_to_do(panel: Inspector) -> None:

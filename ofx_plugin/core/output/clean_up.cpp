@@ -148,7 +148,7 @@ bool CleanUp::load(const float* row, int row_x, int row_end, int x, int y, Block
     }
     kernels_.limit(block.colour, block.guide);
     if (windows_) {
-        const ImagePlace place = image_place(place_.picture, x, y, 1, map_->picks());
+        const ImagePlace place = image_place(place_.clip, x, y, 1, map_->picks());
         each_slot(width, cells_, [&](int slot, int pixel) {
             const Spot spot = place.at(pixel, 0);
             block.place[0][slot] = spot.x;

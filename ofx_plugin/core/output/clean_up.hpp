@@ -40,9 +40,10 @@ int clean_up_support(int cell);
 class CleanUp {
 public:
     struct Place {
-        Area picture;  ///< the whole picture
+        Area picture;  ///< all that counts
         Area source;   ///< the part of it that can be read
         Area drawn;    ///< the part that will be drawn
+        Area clip;     ///< the clip's picture, in which windows of picks lie
         int cell_width, cell_height;
     };
     struct Format {

@@ -367,7 +367,7 @@ void draw_picture(const ConstImageView& in, const ImageView& out, Drawing drawin
     const auto row_at = [&](int y) { return in.row(in.height - 1 - y); };  // y counts upwards
     const int cell = clean_up_cell(1, clip_lines(drawing));
     if (const auto clean_up = make_clean_up(drawing, {in.channels, premultiplied},
-                                            {drawing.picture, whole, whole, cell, cell})) {
+                                            {whole, whole, whole, drawing.picture, cell, cell})) {
         const unsigned processors = std::max(1u, std::thread::hardware_concurrency());
         const int strips = threads == 0 ? static_cast<int>(processors) : threads;
         clean_up->prepare([&](int y, int x1, int, float*) { return row_at(y) + x1 * in.channels; },

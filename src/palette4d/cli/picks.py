@@ -517,7 +517,9 @@ def _told(document: Document, pick: Pick, followed: bool = False, boxed: bool = 
         lines.append("  is not followed through the clip yet: open the sidecar in Studio")
     else:
         source = document.grade.core.clip["source"]
-        why = f": the clip {source!r} was not found; give it with --clip" if followed else ""
+        low, high = pick.span(document.grade.frames)
+        why = f": the clip {source!r} was not found; give it with --clip"
+        why *= followed and low < high
         lines.append(f"  is at the same colour in all frames{why}")
     lines += _window(document, pick, boxed)
     if pick.kind == "pick" and not pick.whole_hue and pick.matte is None:

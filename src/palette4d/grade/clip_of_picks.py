@@ -125,6 +125,11 @@ class ClipOfPicks:
         colours = self.box(frame, pixel, box)
         return as_colour(np.round(colours[main_colour(colours, self.display)].mean(axis=0), DIGITS))
 
+    def alike(self, rgb: Colour, other: Colour) -> bool:
+        """Whether two colours may be one thing's in two clips."""
+        one, two = _core.pick_points([rgb, other], self.display)
+        return bool(np.linalg.norm(one - two) < SAME_COLOUR)
+
     def box(self, frame: float, pixel: tuple[float, float], box: int) -> NDArray[np.float64]:
         """Return the (n, 3) colours of a box around a pixel, in the palette's code values.
 

@@ -61,6 +61,8 @@ class Fit:
         The picks whose colour is not in the target's clip, with what they are, for people.
     everywhere : tuple of str
         The ids of copied picks that have a window in the source: windows are not copied.
+    elsewhere : tuple of str
+        The ids of copied picks whose place in the clip has another colour now.
     unlearned : tuple of str
         The ids of copied picks that take all of their hue, as there is no clip to learn from.
     nothing : bool
@@ -73,6 +75,7 @@ class Fit:
     foreign: float
     left_out: tuple[str, ...] = ()
     everywhere: tuple[str, ...] = ()
+    elsewhere: tuple[str, ...] = ()
     unlearned: tuple[str, ...] = ()
     nothing: bool = False
 
@@ -96,6 +99,15 @@ class Fit:
             text += (
                 f"; {self.foreign:.0%} of the clip's colours are not in the other clip's palette"
             )
+        return text + self.lost
+
+    @property
+    def lost(self) -> str:
+        """What of the picks is not as it was, for people; "" if nothing."""
+        text = ""
+        if self.elsewhere:
+            why = "their place has another colour here"
+            text += f"; picked where their colour is, since {why}: {', '.join(self.elsewhere)}"
         if self.left_out:
             why = "nothing connected has the colour here"
             text += f"; not copied, since {why}: {', '.join(self.left_out)}"
@@ -173,7 +185,7 @@ def copied(
     kept, _ = with_active_kept(target, "before copy")
     after = kept.with_state({**kept.of_kind("version", "note", "lock"), **state})
     picks = (_pick(match, pick, same_clip) for pick in source.picks)
-    after, left_out = taken(after, clip, [pick for pick in picks if pick is not None])
+    after, left_out, away = taken(after, clip, [pick for pick in picks if pick is not None])
     copies = {pick.id: pick for pick in after.picks}
     everywhere = [
         pick.id
@@ -189,6 +201,7 @@ def copied(
         measured,
         left_out=tuple(left_out),
         everywhere=tuple(everywhere),
+        elsewhere=tuple(id_ for id_ in away if id_ in copies),
         unlearned=tuple(unlearned),
         nothing=bool(left_out) and not after.edited,
     )

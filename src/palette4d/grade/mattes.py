@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.grade.picks import Pick
-from palette4d.media.clip_base import MOST_SAMPLES
+from palette4d.media.clip_base import MOST_SAMPLES, FrameError
 from palette4d.media.source_clip import nearest
 
 F32 = NDArray[np.float32]
@@ -89,6 +89,8 @@ def learn(
 ) -> Learned:
     """Learn the matte of a pick or hold from `frames` of its clip; `holds` are background.
 
+    Bad frames without marks are passed over.
+
     Raises
     ------
     Palette4dError
@@ -110,7 +112,12 @@ def learn(
     for frame in chosen:
         colour = tuple(pick.colour_at(frame).tolist())
         places = own.get(frame, []), background.get(frame, [])
-        pixels = image if frame == first else read(frame)
+        try:
+            pixels = image if frame == first else read(frame)
+        except FrameError:  # a bad frame; what was marked in one is needed
+            if any(places):
+                raise
+            continue
         given.append((pixels, colour, *places, frame in seeded))
     learned = _core.learn_matte(
         given,

@@ -319,17 +319,24 @@ def unpick(grade: Grade, clip: ClipOfPicks, *ids: str) -> Grade:
     return _with_mattes(grade, clip, removed).labelled(f"remove {' '.join(ids)}")
 
 
-def taken(grade: Grade, clip: ClipOfPicks, picks: Iterable[Pick]) -> tuple[Grade, list[str]]:
-    """Take over picks of another palette, learned here; return also those whose colour is not here.
+def taken(
+    grade: Grade, clip: ClipOfPicks, picks: Iterable[Pick]
+) -> tuple[Grade, list[str], list[str]]:
+    """Take over picks of another palette, learned here.
 
-    Those with a place in this clip are picked there; of others the colour is looked for.
-    Without the clip they take all of their hue, as they cannot be learned.
+    Those with a place in this clip are picked there, if it has nearly their colour; of others the
+    colour is looked for. Without the clip they take all of their hue, as they cannot be learned.
+    Return also those whose colour is not here, and the ids of those whose place has another one.
     """
-    left_out, moved, there = [], [], clip.open() is not None
+    left_out, away, moved, there = [], [], [], clip.open() is not None
     for pick in picks:
         here: Pick | None = pick
         if there and pick.pixel is not None:
-            here = replace(pick, rgb=clip.colour(pick.frame, pick.pixel, pick.box or 1))
+            rgb = clip.colour(pick.frame, pick.pixel, pick.box or 1)
+            here = replace(pick, rgb=rgb)
+            if not clip.alike(rgb, pick.rgb):
+                away.append(pick.id)
+                here = clip.at_home(replace(pick, areas=(), window=None), grade.display())
         elif there and not pick.whole_hue:
             here = clip.at_home(pick, grade.display())
         if here is None:
@@ -338,7 +345,7 @@ def taken(grade: Grade, clip: ClipOfPicks, picks: Iterable[Pick]) -> tuple[Grade
             moved.append(replace(here, path=clip.path(here)) if there else here)
     for pick in moved:
         grade = grade.put("pick", pick.id, pick)
-    return _with_mattes(grade, clip, moved), left_out
+    return _with_mattes(grade, clip, moved), left_out, away
 
 
 def warnings(grade: Grade, clip: ClipOfPicks, id: str) -> tuple[str, ...]:

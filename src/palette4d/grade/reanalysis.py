@@ -24,10 +24,7 @@ from palette4d.media.clip_files import files_of
 
 #: `quality.options.method` of a palette that `analyze --like` moved.
 _MOVED = "like"
-_SCALED = (
-    "this clip has {}x{} pixels, the former one {}x{}: the places of picks, and their windows, are "
-    "scaled with it"
-)
+_SCALED = "this clip has another size: the places of picks, and their windows, are scaled with it"
 
 
 def save(
@@ -49,14 +46,14 @@ def save(
     former = Grade.of(*old[:2], target)
     new = Grade.of(sidecar.validate(fields, str(target)), fields, None)
     extra = fields.get("extra") or before["extra"]
-    own, other = (tuple(members["clip"]["size"]) for members in (fields, before))
-    by = own[0] / other[0], own[1] / other[1]
+    by = _growth(fields["clip"], before["clip"])
+    places = any(pick.marks or pick.window for pick in former.picks)
+    scaled = [_SCALED] if places and by != (1, 1) else []
     if (moved := _with_same_handles(former, new, by)) is not None:
         steps = [_scaled_steps(part, by) for part in history_of(before, str(target))]
         kept_fields = {**moved.fields(*steps), "extra": extra}
         saved = sidecar.save(kept_fields, target, on_edits="drop", replaces=read)
-        places = any(pick.marks or pick.window for pick in former.picks)
-        return saved, [_SCALED.format(*own, *other)] if places and own != other else []
+        return saved, scaled
     if clip is not None and sandbox.of_command():
         with Child(reads=files_of(clip)) as child:
             copy, notes = child.call(_copied, read, fields, target, clip)
@@ -68,7 +65,7 @@ def save(
             temporary.write_bytes(read)
     notes.append(f"the former palette with its edits is kept in {kept.name}")
     kept_fields = {**copy, "extra": extra}
-    return sidecar.save(kept_fields, target, on_edits="drop", replaces=read), notes
+    return sidecar.save(kept_fields, target, on_edits="drop", replaces=read), scaled + notes
 
 
 def _copied(
@@ -81,15 +78,17 @@ def _copied(
     clip, notes = ClipOfPicks.of(new, given), []
     own, other = (grade.members["clip"] for grade in (new, former))
     time = _time(own, other)
-    same = own["source"] == other["source"] and own["size"] == other["size"]
+    former = former.with_state(_scaled(former.state, _growth(own, other)))
     for name in former.versions:
         if (version := former.version(name)).edited:
-            new, _ = copied(new, version, clip, time, same_clip=same)
+            new, fit = copied(new, version, clip, time, same_clip=True)
+            if fit.lost:
+                notes.append(f"version {name}{fit.lost}")
         new, _ = save_version(new, name)
         new = set_note(new, name, former.note(name))
         new = reset(new)
     if former.edited:
-        new, fit = copied(new, former, clip, time, same_clip=same)
+        new, fit = copied(new, former, clip, time, same_clip=True)
         fit = replace(fit, nothing=False)  # the former edits do not stay here
         notes.append(f"the palette changed, so that the grade was copied: {fit}")
     name = "copy the grade of the former analysis"
@@ -124,6 +123,12 @@ def _with_same_handles(old: Grade, new: Grade, by: tuple[float, float]) -> Grade
     except SidecarError:  # a handle has moved in time beyond an edit
         return None
     return moved
+
+
+def _growth(own: Fields, other: Fields) -> tuple[float, float]:
+    """Return how many times as wide and as high a clip is as the former one."""
+    (width, height), (before, high) = own["size"], other["size"]
+    return width / before, height / high
 
 
 def _scaled(state: State, by: tuple[float, float]) -> dict[Key, Any]:

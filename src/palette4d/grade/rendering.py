@@ -406,12 +406,12 @@ def with_surroundings(
 
     Overscan, further channels and parts of EXR stay in EXR, if the picture is the recoloured one.
     """
-    if not isinstance(clip, ImageClip) or not clip.more:
+    if not isinstance(clip, ImageClip) or not (more := clip.surroundings()):
         return clip, []
     kept = pattern.extension == "exr" and drawn.kind == "recoloured" and compare is None
     if kept and clip.separable:
         return replace(clip, whole=True), []
-    return clip, [f"not kept of the clip's files: {clip.more}"]
+    return clip, [f"not kept of the clip's files: {more}"]
 
 
 def refuse_codec(output: str, codec: str | None, crf: int | None) -> None:
@@ -435,6 +435,10 @@ def opened_for_render(
     Frames before its first or behind its last file are an error: they are no gap.
     """
     if isinstance(clip, Clip):
+        if frames is not None:
+            raise ClipError(
+                f"found {Arg('frames')} {frames!r} beside an opened clip, expected it in open_clip"
+            )
         skip_bad_frames = skip_bad_frames or clip.skip_bad_frames
     else:
         tolerant = skip_bad_frames or missing != "error"

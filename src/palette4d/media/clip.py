@@ -105,7 +105,7 @@ def _opened(
             f"({', '.join(sorted(clip_sequence.IMAGE_EXTENSIONS))}) or a movie "
             f"({', '.join(sorted(clip_sequence.MOVIE_EXTENSIONS))})"
         )
-    if any(mark in path.name for mark in "#@%$<"):
+    if clip_sequence.Pattern.parse(path.name) is not None:
         sequence, embedded = clip_sequence.of_pattern(spec)
         return images(sequence, embedded, False)
     raise ClipError(

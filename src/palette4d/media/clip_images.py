@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -56,6 +57,16 @@ class ImageClip(Clip):
         header = read_header(first, "the first file", self.reading)
         exr = self.sequence.suffix.lower() == ".exr"
         return exr and header.is_upright and len(set(header.channels)) == len(header.channels)
+
+    def surroundings(self) -> str:
+        """Other contents of the sequence's EXR files, in words: of the first file that has some."""
+        if self.more or self.sequence.suffix.lower() != ".exr":
+            return self.more
+        for frame in self.sequence.numbers:
+            with contextlib.suppress(FrameError):
+                if more := read_header(self.file(frame), f"frame {frame}", self.reading).more:
+                    return more
+        return ""
 
     def file(self, frame: int) -> Path:
         """The file of a frame, whether it exists or not."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,6 +36,11 @@ _ANONYMOUS = re.compile(
     re.IGNORECASE,
 )
 _FOLDERS_TO_NAME_BY = 3
+# The mark for the frame number in a pattern, and a range before it: numbers with a separator before
+# them, as in "name.1001-1100#.exr", "name.1-10x2,15#.exr".
+_PADDING = re.compile(r"#+|@+|(%[0-9]*d|\$F[0-9]*)(?![A-Za-z])")
+_ONE_RANGE = r"-?[0-9]+(--?[0-9]+(x[0-9]+)?)?"
+_RANGE = re.compile(rf"((?<=[._ ])|\A){_ONE_RANGE}(,{_ONE_RANGE})*\Z")
 # "shot_v2" is version 2, not frame 2.
 _VERSION = re.compile(r"(^|.*[._ -])[vV]\Z", re.DOTALL)
 
@@ -186,55 +191,93 @@ def in_folder(folder: Path) -> ImageSequence | Path:
     )
 
 
+@dataclass(frozen=True)
+class Pattern:
+    """The parts of a name for frames: `prefix`, a number of at least `width` digits, `suffix`.
+
+    `padding` is the mark for the number: `####`, `%04d`, `@@@@`, `$F4`. `frames` is a range that
+    stands before it in some programs' names, or ""; `prefix` ends before the range.
+    """
+
+    prefix: str
+    frames: str
+    padding: str
+    suffix: str
+
+    @classmethod
+    def parse(cls, name: str) -> Pattern | None:
+        """Read the last mark of a name; None if there is none.
+
+        >>> Pattern.parse("sh010-####.exr").prefix, Pattern.parse("a.1-10x2#.exr").frames
+        ('sh010-', '1-10x2')
+        """
+        marks = list(_PADDING.finditer(name))
+        if not marks:
+            return None
+        before, suffix = name[: marks[-1].start()], name[marks[-1].end() :]
+        found = _RANGE.search(before)
+        frames = found[0] if found else ""
+        return cls(before.removesuffix(frames), frames, marks[-1][0], suffix)
+
+    @property
+    def width(self) -> int:
+        """The least number of digits."""
+        digits = re.sub(r"[^0-9]", "", self.padding)
+        return int(digits) if digits else 1 if self.padding[0] in "%$" else len(self.padding)
+
+    @property
+    def literal(self) -> Pattern:
+        """The pattern whose range is a part of the name."""
+        return Pattern(self.prefix + self.frames, "", self.padding, self.suffix)
+
+
 def of_pattern(spec: str) -> tuple[ImageSequence, str | None]:
     """(sequence, embedded range or None) of `name.####.exr`, `%04d`, `@@@`, `1-10x2#`."""
-    from fileseq.constants import PAD_STYLE_HASH1
-    from fileseq.exceptions import FileSeqException
-    from fileseq.filesequence import FileSequence
-
     path = Path(spec)
     folder = path.parent
-    # fileseq lists each frame of "1-9999999x2,1-9999999y3", for minutes.
-    own = re.search(r"[0-9,xy:-]*(?=[#@%$<])", path.name)
-    ends = re.findall(r"([0-9]+)-+([0-9]+)", own[0] if own else "")
-    if sum(abs(int(last) - int(first)) for first, last in ends) > MAX_FRAMES:
-        raise ClipError(
-            f"{spec}: the pattern's own range holds more than {MAX_FRAMES} frames; expected fewer, "
-            f"or one of {Arg('frames')}"
-        )
-    try:
-        # One `#` means one digit, as in the sidecar's source.
-        parsed = FileSequence(path.name, pad_style=PAD_STYLE_HASH1)
-    except FileSeqException as error:
+    parsed = Pattern.parse(path.name)
+    if parsed is None:
         raise ClipError(
             f"{spec}: the pattern cannot be understood; expected one such as name.####.exr, "
             "name.%04d.exr, name.@@@@.exr or name.1001-1100#.exr"
-        ) from error
-    prefix, suffix = str(parsed.basename()), str(parsed.extension())
-    width = int(parsed.zfill())
+        )
     if extension(path.name) not in IMAGE_EXTENSIONS:
         raise ClipError(
             f'{spec}: found the extension "{extension(path.name)}", expected an image format '
             f"({', '.join(sorted(IMAGE_EXTENSIONS))})"
         )
-    embedded = str(parsed.frameSet()) if parsed.frameSet() else None
     if not folder.is_dir():
         raise ClipError(f"{spec}: the folder {folder} does not exist; check the path")
 
-    number = re.compile(re.escape(prefix) + r"(-?[0-9]+)" + re.escape(suffix))
     names = _file_names(folder)
-    matches = [(match[1], name) for name in names if (match := number.fullmatch(name))]
-
-    # A single `#` means any number in some programs, four digits in others: the files decide.
-    if str(parsed.padding()) == "#" and matches:
-        sequences = list(_by_width(folder, prefix, suffix, matches))
-        sequence = max(sequences, key=lambda each: len(each.files))
+    sequence = _matching(parsed.literal, folder, names)
+    if sequence.files or not parsed.frames:
+        found: str | None = None
     else:
-        files = {int(n): folder / name for n, name in matches if _digits_fit(n, width)}
-        sequence = ImageSequence(folder, prefix, suffix, width, files)
+        # Each frame of "1-9999999x2,1-9999999x3" would be listed, for minutes.
+        ends = re.findall(r"([0-9]+)-+([0-9]+)", parsed.frames)
+        if sum(abs(int(last) - int(first)) for first, last in ends) > MAX_FRAMES:
+            raise ClipError(
+                f"{spec}: the pattern's own range holds more than {MAX_FRAMES} frames; expected "
+                f"fewer, or one of {Arg('frames')}"
+            )
+        sequence, found = _matching(parsed, folder, names), parsed.frames
     if not sequence.files:
         raise ClipError(f"{spec}: no file matches the pattern; {_near(spec, folder)}")
-    return sequence, embedded
+    return sequence, found
+
+
+def _matching(pattern: Pattern, folder: Path, names: Iterable[str]) -> ImageSequence:
+    """Return the sequence of the files with a pattern's prefix, digits and suffix."""
+    prefix, suffix, width = pattern.prefix, pattern.suffix, pattern.width
+    number = re.compile(re.escape(prefix) + r"(-?[0-9]+)" + re.escape(suffix))
+    matches = [(match[1], name) for name in names if (match := number.fullmatch(name))]
+    # A single `#` means any number in some programs, four digits in others: the files decide.
+    if pattern.padding == "#" and matches:
+        sequences = list(_by_width(folder, prefix, suffix, matches))
+        return max(sequences, key=lambda each: len(each.files))
+    files = {int(n): folder / name for n, name in matches if _digits_fit(n, width)}
+    return ImageSequence(folder, prefix, suffix, width, files)
 
 
 def _near(spec: str, folder: Path) -> str:

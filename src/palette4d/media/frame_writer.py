@@ -23,6 +23,7 @@ from palette4d.common.errors import Arg, Palette4dError, WriteError
 from palette4d.common.files import EXISTS, replacing
 from palette4d.media import oiio_text
 from palette4d.media.clip_base import strips
+from palette4d.media.clip_sequence import Pattern
 from palette4d.media.exr_around import has_every_block
 
 FORMATS = ("exr", "png", "tif", "tiff", "dpx", "jpg", "jpeg")
@@ -62,35 +63,21 @@ class FramePattern:
 
         `also` is what errors offer besides frames.
         """
-        from fileseq.constants import PAD_STYLE_HASH1
-        from fileseq.exceptions import FileSeqException
-        from fileseq.filesequence import FileSequence
-
         path = Path(text)
         if path.suffix.lower().lstrip(".") not in FORMATS:
             raise OutputError(
                 f'output {text}: found the extension "{path.suffix}", expected {_EXPECTED}; '
                 f"name the frames as in OUT.####.exr{also}"
             )
-        if not any(mark in path.name for mark in "#@%$"):
+        parsed = Pattern.parse(path.name)
+        if parsed is None:
             return cls(path.parent, path.stem, path.suffix, None)
-        try:
-            parsed = FileSequence(path.name, pad_style=PAD_STYLE_HASH1)
-        except FileSeqException as error:
+        if "-" in parsed.frames.lstrip("-"):
             raise OutputError(
-                f"output {text}: the pattern cannot be understood; expected one such as "
-                "OUT.####.exr"
-            ) from error
-        if not parsed.padding():
-            return cls(path.parent, path.stem, path.suffix, None)
-        if parsed.frameSet():
-            raise OutputError(
-                f"output {text}: found the range {parsed.frameSet()} in its name, expected "
+                f"output {text}: found the range {parsed.frames} in its name, expected "
                 f"a pattern such as OUT.####.exr; choose the frames with {Arg('frames')}"
             )
-        return cls(
-            path.parent, str(parsed.basename()), str(parsed.extension()), int(parsed.zfill())
-        )
+        return cls(path.parent, parsed.literal.prefix, parsed.suffix, parsed.width)
 
     @property
     def extension(self) -> str:

@@ -166,7 +166,8 @@ def _part(source: Any, path: Path, reading: Reading) -> tuple[Any, list[int] | N
             if value is not None
         )
         raise ClipError(
-            f"{path}: found no {wanted}, the file has {exr_layers.described(specs)}; choose one"
+            f"{path}: found no {wanted}, the file has {exr_layers.described(specs)}; choose one, "
+            "NAME.exr?layer= is the main layer"
         )
     source.seek_subimage(0, 0)
     return source.spec(), None

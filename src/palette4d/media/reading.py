@@ -6,13 +6,14 @@ A sidecar's `clip.source` holds it, so that every program reads the clip in the 
 from __future__ import annotations
 
 import re
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from palette4d.common.errors import Palette4dError
+from palette4d.media.clip_sequence import IMAGE_EXTENSIONS, MOVIE_EXTENSIONS, extension
 from palette4d.media.colour_tags import MATRICES
 
-_SUFFIX = re.compile(r"\?((?:layer|view|matrix)=[^?&]+(?:&(?:layer|view|matrix)=[^?&]+)*)$")
+_SUFFIX = re.compile(r"\?((?:layer|view|matrix)=[^?&]*(?:&(?:layer|view|matrix)=[^?&]*)*)$")
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Reading:
 
     Attributes
     ----------
-    layer, view : of EXR; None for the first that has red, green and blue.
+    layer, view : of EXR; None for the first that has red, green and blue; "" is the main one.
     matrix : of Y'CbCr movies that state none: a name of `MATRICES`; None for the rule.
     """
 
@@ -67,6 +68,19 @@ def read_as(spec: str, **asked: Any) -> str:
 
 
 def like_source(spec: str, source: str) -> str:
-    """Return a clip's name, read as a sidecar's source is unless it says itself how."""
+    """Return a clip's name, read as a sidecar's source is unless it says itself how.
+
+    Only EXR has layers and views, and only movies have a matrix: a proxy may be another kind.
+
+    >>> like_source("a.mov", "b.####.exr?view=left"), like_source("a.exr?layer=", "b.exr?layer=id")
+    ('a.mov', 'a.exr?layer=')
+    """
     name, own = split(spec)
-    return spec if str(own) else name + str(split(source)[1])
+    if str(own):
+        return spec
+    given, kind = split(source)[1], extension(name)
+    if kind in IMAGE_EXTENSIONS:
+        given = replace(given, matrix=None)
+    if kind in MOVIE_EXTENSIONS or (kind in IMAGE_EXTENSIONS and kind != "exr"):
+        given = replace(given, layer=None, view=None)
+    return name + str(given)

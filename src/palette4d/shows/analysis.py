@@ -16,6 +16,7 @@ from palette4d.jobs.workers import Workers
 from palette4d.media.clip import open_clip
 from palette4d.media.colour_space import SpaceOptions
 from palette4d.shows import find_media, shots, timeline_clips, timeline_files, timeline_shots
+from palette4d.shows import manifest as manifests
 from palette4d.shows.batch import Show, ShowOptions, Source, analyse
 from palette4d.shows.manifest import FAILED
 from palette4d.shows.shots import Shot
@@ -111,7 +112,7 @@ def analyze_shots(
         workers=Workers(jobs, cluster),
     )
     if is_timeline(name):
-        source, listed, notes = _of_timeline(Path(name), rate, media, handles, conform)
+        source, listed, notes = _of_timeline(Path(name), folder, rate, media, handles, conform)
     else:
         opened = open_clip(name, frames=frames, rate=rate, skip_bad_frames=skip_bad_frames)
         listed = shots.detect(opened, lambda done, total: tell("cuts", done, total))
@@ -120,7 +121,7 @@ def analyze_shots(
     done = analyse(
         source, listed, folder, options, lambda done, total, words: tell(words, done, total)
     )
-    if notes:
+    if notes := [*notes, *done.notes.get("", ())]:
         done.notes[""] = tuple(map(Message, notes))
     failed = [entry for entry in done.manifest.entries if entry.status == FAILED]
     if failed:
@@ -135,12 +136,13 @@ def analyze_shots(
 
 def _of_timeline(
     path: Path,
+    into: Path,
     rate: Fraction | None,
     media: str | os.PathLike[str] | None,
     handles: int,
     conform: Conform | None,
 ) -> tuple[Source, list[Shot], list[str]]:
-    """Return a timeline, its shots, and notes."""
+    """Return a timeline, its shots, which keep the names that they have in `into`, and notes."""
     there = path.is_file() or (path / "content.otio").is_file()
     sha256 = timeline_files.sha256(path) if there else ""  # the reader says why not
     timeline = timeline_clips.read(path, rate)
@@ -148,7 +150,10 @@ def _of_timeline(
         raise Palette4dError(f"{path}: it was changed while it was read; run the command again")
     folder = None if media is None else find_media.Folder(Path(media))
     listed, counting = timeline_shots.shots_of(timeline, folder, handles, conform)
-    named, renamed = shots.numbered(listed)
+    source = Source(file_safe(path.stem), str(path), sha256, timeline.rate)
+    manifest = manifests.path_of(into, source.name)
+    before = manifests.read(manifest).entries if manifest.exists() else ()
+    named, renamed = shots.numbered(listed, {each.shot.name: each.shot.used for each in before})
     notes = [f"not analysed: {note}" for note in timeline.notes] + counting
     if timeline_files.is_edl(path) and rate is None:
         notes.append(
@@ -165,5 +170,4 @@ def _of_timeline(
             f"{'was' if len(renamed) == 1 else 'were'} renamed by the first frame: "
             f"{some_of(renamed)}"
         )
-    source = Source(file_safe(path.stem), str(path), sha256, timeline.rate)
     return source, named, notes

@@ -168,6 +168,12 @@ class Show:
         self.graded: list[str] = []  # whose edits would be lost
         for shot in shots:
             self.plan(shot, known.get(shot.name))
+        if gone := [name for name in known if name not in self.entries and self.has_edits(name)]:
+            self.notes[""] = (
+                f"{counted(len(gone), 'graded shot is', 'graded shots are')} no longer in the "
+                f"edit, and {'its sidecar stays' if len(gone) == 1 else 'their sidecars stay'} in "
+                f"the folder: {some_of(gone)}",
+            )
         if self.graded:
             raise Palette4dError(
                 f"{counted(len(self.graded), 'shot has', 'shots have')} edits that a new analysis "
@@ -180,6 +186,13 @@ class Show:
         """Return one line: the manifest's file, and how many shots have a sidecar."""
         done = sum(entry.status == DONE for entry in self.entries.values())
         return f"<Show {str(self.path)!r}: {done} of {counted(len(self.entries), 'shot')} done>"
+
+    def has_edits(self, name: str) -> bool:
+        """Whether a shot's sidecar has edits."""
+        try:
+            return sidecar.has_edits(sidecar.load(self.folder / f"{name}.p4d.json"))
+        except Palette4dError:
+            return False
 
     @property
     def manifest(self) -> Manifest:

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Callable, Iterable, Iterator
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from palette4d.analysis import colour_statistics
 from palette4d.analysis.options import AnalysisOptions
@@ -19,6 +20,8 @@ from palette4d.shows.edl_cdl import Cdl
 
 #: Largest number of colours per frame in the search for cuts.
 BINS = 4096
+#: What `numbered` adds to a name.
+_SUFFIX = re.compile(r"_f-?\d+(_\d+)?$")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,26 +92,60 @@ def words_of_speed(speed: float) -> str:
     return " ".join(words + ["backwards"] * (speed < 0))
 
 
-def numbered(shots: Iterable[Shot]) -> tuple[list[Shot], list[str]]:
+def numbered(
+    shots: Sequence[Shot], former: Mapping[str, tuple[int, int]] | None = None
+) -> tuple[list[Shot], list[str]]:
     """Return the shots with unique names, and the names that changed.
 
     If several shots have one name, the first keeps it. The others get their first frame as a
-    suffix: `A`, `A_f120`. So names stay the same when the editor inserts other shots.
+    suffix: `A`, `A_f120`. `former` are the names of an earlier run and the frames that they had: a
+    shot of the same frames, or else of most of them, keeps its name wherever it stands now.
     """
-    taken: set[str] = set()
+    names = _kept_names(shots, former or {})
+    taken = {name.casefold() for name in names.values()}
     numbers: dict[str, Iterator[int]] = {}
-    out, changed = [], []
-    for shot in shots:
+    for i, shot in enumerate(shots):
+        if i in names:
+            continue
         name = shot.name
         if name.casefold() in taken:
             name = begin = f"{shot.name}_f{shot.used[0]}"
             again = numbers.setdefault(begin.casefold(), itertools.count(2))
             while name.casefold() in taken:
                 name = f"{begin}_{next(again)}"
-            changed.append(name)
         taken.add(name.casefold())
-        out.append(dataclasses.replace(shot, name=name))
-    return out, changed
+        names[i] = name
+    out = [dataclasses.replace(shot, name=names[i]) for i, shot in enumerate(shots)]
+    return out, [now.name for now, shot in zip(out, shots, strict=True) if now.name != shot.name]
+
+
+def _kept_names(shots: Sequence[Shot], former: Mapping[str, tuple[int, int]]) -> dict[int, str]:
+    """Return the former names of shots by their places in the list."""
+    kept: dict[int, str] = {}
+    same: dict[tuple[str, tuple[int, int]], list[str]] = {}
+    alike: dict[str, list[str]] = {}
+    for name, used in former.items():
+        for own in {name.casefold(), _SUFFIX.sub("", name.casefold())}:
+            same.setdefault((own, used), []).append(name)
+            alike.setdefault(own, []).append(name)
+    taken: set[str] = set()
+    for i, shot in enumerate(shots):
+        names = same.get((shot.name.casefold(), shot.used), [])
+        for name in [name for name in names if name not in taken][:1]:
+            kept[i] = name
+            taken.add(name)
+    pairs = [
+        (min(shot.used[1], former[name][1]) - max(shot.used[0], former[name][0]) + 1, i, name)
+        for i, shot in enumerate(shots)
+        if i not in kept
+        for name in alike.get(shot.name.casefold(), [])
+        if name not in taken
+    ]
+    for shared, i, name in sorted(pairs, key=lambda pair: -pair[0]):
+        if shared > 0 and i not in kept and name not in taken:
+            kept[i] = name
+            taken.add(name)
+    return kept
 
 
 def detect(clip: Clip, progress: Callable[[int, int], object] | None = None) -> list[Shot]:

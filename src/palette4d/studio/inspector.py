@@ -472,7 +472,10 @@ class Inspector(QWidget):
         if self._tried and self.session.dragging:
             return Target("", "place", place.frame, before, np.asarray(self._tried), place)
         pixel = before.astype(np.float32).reshape(1, 1, 3)
-        after = document.recolour(pixel, place.frame, space="palette")[0, 0].astype(np.float64)
+        width, height = document.grade.members["clip"]["size"]
+        picture = -int(place.x), -int(place.y), width, height
+        drawn = document.recolour(pixel, place.frame, space="palette", picture=picture)
+        after = drawn[0, 0].astype(np.float64)
         return Target("", "place", place.frame, before, after, place)
 
     def _said(self) -> str:

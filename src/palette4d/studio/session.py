@@ -15,9 +15,6 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TypeVar
 
-# Not used here: two threads that import it at once get an ImportError, so it comes before them.
-import fileseq  # noqa: F401
-
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.files import same_file
 from palette4d.common.folders import state_folder

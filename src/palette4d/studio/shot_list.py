@@ -129,7 +129,7 @@ class Shots(QWidget):
             if entry.status == manifest.DONE:
                 self._chosen(row)
                 break
-        self.draw()  # not before: two threads that import fileseq at once find it incomplete
+        self.draw()
 
     def step(self, way: int) -> None:
         """Open the next or previous shot that has a palette."""

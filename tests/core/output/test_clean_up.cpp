@@ -76,7 +76,7 @@ std::vector<float> change(const Image& image, const Drawing& drawing, int left, 
                           const Area& area, int width, int height, int threads = 1) {
     const Area whole = {left, bottom, left + image.width, bottom + image.height};
     CleanUp clean_up(drawing.edit, nullptr, 1, {image.channels, image.channels == 4},
-                     {whole, whole, area, width, height});
+                     {whole, whole, area, whole, width, height});
     const auto at = [&](int x, int y) {
         return &image.data[static_cast<std::size_t>((y - bottom) * image.width + x - left) *
                            image.channels];
@@ -195,15 +195,15 @@ TEST(nothing_is_cleaned_up_without_picks) {
     const Mesh mesh = tetrahedron();
     drawing.edit = std::make_shared<const Recolourer>(mesh.rgb, drawing.edited, mesh.faces);
     const Area whole = {0, 0, 60, 40};
-    CHECK(!make_clean_up(drawing, {4, false}, {whole, whole, whole, 4, 4}));
+    CHECK(!make_clean_up(drawing, {4, false}, {whole, whole, whole, whole, 4, 4}));
     Drawing off = drawing;
     off.options.clean_up = 0;
     CHECK(same_bits(cleaned_picture(in, drawing).data, cleaned_picture(in, off).data));
     drawing = picked_drawing(true);
-    CHECK(make_clean_up(drawing, {4, false}, {whole, whole, whole, 4, 4}) != nullptr);
+    CHECK(make_clean_up(drawing, {4, false}, {whole, whole, whole, whole, 4, 4}) != nullptr);
     for (const Output output : {Output::kWeight, Output::kOutside}) {
         drawing.options.output = output;
-        CHECK(!make_clean_up(drawing, {4, false}, {whole, whole, whole, 4, 4}));
+        CHECK(!make_clean_up(drawing, {4, false}, {whole, whole, whole, whole, 4, 4}));
     }
 }
 
