@@ -163,7 +163,7 @@ std::vector<double> pick_times_of(const NamedEdits& self) {
         if (!pick.enabled) continue;
         times.push_back(pick.frame);
         for (const palette4d::PathKey& key : pick.path) times.push_back(key.frame);
-        const double in = pick.ramp_in(self.frame_step), out = pick.ramp_out(self.frame_step);
+        const double in = pick.ramp_in(), out = pick.ramp_out();
         if (pick.from) times.insert(times.end(), {*pick.from - in, *pick.from});
         if (pick.until) times.insert(times.end(), {*pick.until, *pick.until + out});
     }
@@ -174,7 +174,7 @@ std::vector<double> pick_times_of(const NamedEdits& self) {
 std::vector<std::string> windows_at(const NamedEdits& self, double frame) {
     std::vector<std::string> ids;
     for (const palette4d::Pick& pick : self.picks) {
-        if (pick.enabled && pick.window && pick.strength_at(frame, self.frame_step) > 0) {
+        if (pick.enabled && pick.window && pick.strength_at(frame) > 0) {
             ids.push_back(pick.id);
         }
     }

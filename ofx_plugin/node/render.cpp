@@ -85,7 +85,7 @@ Area area_of(const OfxRectI& rect) { return {rect.x1, rect.y1, rect.x2, rect.y2}
 
 /// Where the clip's picture is, in which windows of picks lie. A host may hand over more of a file
 /// (overscan) or less (an element in its bounding box): if the project alone has the clip's size,
-/// that is where its picture is.
+/// that is where its picture is. A picture of the clip's shape in the project's corner is a proxy.
 Area clip_area(const Suites& suites, OfxImageEffectHandle effect, const OfxRectI& definition,
                const Scale& scale, const Drawing& drawing) {
     const Recolourer* const map = drawing.reader ? drawing.reader.get() : drawing.edit.get();
@@ -102,19 +102,22 @@ Area clip_area(const Suites& suites, OfxImageEffectHandle effect, const OfxRectI
     const double aspect =
         properties.get_double(kOfxImageEffectPropProjectPixelAspectRatio).value_or(1);
     const double x = scale.x / (aspect > 0 ? aspect : 1), y = scale.y;
-    const long width = pixels(kOfxImageEffectPropProjectSize, 0, x);
-    const long height = pixels(kOfxImageEffectPropProjectSize, 1, y);
+    const auto width = static_cast<double>(pixels(kOfxImageEffectPropProjectSize, 0, x));
+    const auto height = static_cast<double>(pixels(kOfxImageEffectPropProjectSize, 1, y));
     const double own_width = map->picks().width, own_height = map->picks().height;
-    const auto has_its_size = [&](long w, long h) {
-        return std::abs(own_width * scale.x - static_cast<double>(w)) <= 1 &&
-               std::abs(own_height * scale.y - static_cast<double>(h)) <= 1;
+    const auto has_its_size = [&](double w, double h) {
+        return std::abs(own_width * scale.x - w) <= 1 && std::abs(own_height * scale.y - h) <= 1;
     };
-    if (has_its_size(long{definition.x2} - definition.x1, long{definition.y2} - definition.y1) ||
-        !has_its_size(width, height)) {
-        return area_of(definition);
-    }
     const int left = static_cast<int>(pixels(kOfxImageEffectPropProjectOffset, 0, x));
     const int bottom = static_cast<int>(pixels(kOfxImageEffectPropProjectOffset, 1, y));
+    const double wide = static_cast<double>(definition.x2) - definition.x1;
+    const double high = static_cast<double>(definition.y2) - definition.y1;
+    const double shape = own_width * scale.x / (own_height * scale.y);
+    const bool has_its_shape = std::abs(wide - high * shape) <= std::max(1.0, shape);
+    const bool is_proxy = has_its_shape && definition.x1 == left && definition.y1 == bottom;
+    if (is_proxy || has_its_size(wide, high) || !has_its_size(width, height)) {
+        return area_of(definition);
+    }
     return {left, bottom, left + static_cast<int>(width), bottom + static_cast<int>(height)};
 }
 

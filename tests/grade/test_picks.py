@@ -1,5 +1,6 @@
 """Picks as values: their change along a path, where it stays alike, and what is said of it."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,28 @@ def test_a_path_is_alike_until_it_leaves_the_picked_colour() -> None:
         PathKey(30, GREY, there=0),
     )
     assert Pick("p1", "hold", 10, GREY, path=gone).alike() == (10, 21)
+
+
+def test_a_range_keeps_to_its_frames_where_not_all_were_analysed(tmp_path: Path) -> None:
+    """The node draws the frames between the analysed ones too."""
+    document = Document.load(shutil.copy(SPLIT.with_name("v1_step_two.p4d.json"), tmp_path))
+    first, _, step = document.grade.frames
+    assert step == 2
+    within = {"start": first + 4, "until": first + 6}
+    document.pick(first + 4, colour=(0.6, 0.2, 0.2), to=(0.2, 0.6, 0.2), **within)
+    image = np.full((1, 1, 3), (0.6, 0.2, 0.2), np.float32)
+
+    def changed() -> list[bool]:
+        frames = range(first + 2, first + 9)
+        recoloured = [document.recolour(image, n, space="palette") for n in frames]
+        return [bool((one != image).any()) for one in recoloured]
+
+    assert changed() == [False, False, True, True, True, False, False]
+    document.undo()
+    document.adjust(by=(0.1, 0.1, 0.1), **within)
+    for frame, moves in zip(range(first + 2, first + 9), [0, 0, 1, 1, 1, 0, 0], strict=True):
+        palette = document.grade.palette(frame)
+        assert (palette.edited != palette.rgb).any() == moves
 
 
 def test_a_darker_colour_changes_less_and_a_lighter_one_no_more() -> None:

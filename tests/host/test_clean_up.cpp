@@ -128,6 +128,21 @@ TEST(windows_lie_in_the_project_where_it_alone_has_the_clips_size) {
     }
 }
 
+TEST(windows_lie_in_a_proxy_of_the_clip_in_a_project_of_its_size) {
+    Picked node;
+    node.set("cleanUp", 0.0);
+    const OfxRectI half = rect(0, 0, 32, 24);
+    const Picture source = cropped(scene_of(large(rect(-10, -9, 90, 80))), half, 1);
+    Picture reference(source.layout()), drawn(source.layout());
+    CHECK(node.instance->render(2, &source, reference, half) == kOfxStatOK);
+    auto& properties = node.instance->effect().properties;
+    properties.put_all(kOfxImageEffectPropProjectSize, {64.0, 48.0});
+    properties.put_all(kOfxImageEffectPropProjectOffset, {0.0, 0.0});
+    properties.put(kOfxImageEffectPropProjectPixelAspectRatio, 1.0);
+    CHECK(node.instance->render(2, &source, drawn, half) == kOfxStatOK);
+    CHECK(drawn.pixels(half) == reference.pixels(half));
+}
+
 TEST(tiles_with_their_region_of_interest_are_the_whole_picture) {
     for (const bool moves : {false, true}) {
         Picked node(moves);

@@ -380,13 +380,13 @@ def on_path(pick: Document, frame: float) -> tuple[F64, float]:
     return now[:3], float(now[3])
 
 
-def strength_of(pick: Document, frame: float, step: float) -> float:
+def strength_of(pick: Document, frame: float) -> float:
     """How much of a pick's change is asked for at a frame."""
     if not pick.get("enabled", True):
         return 0.0
     fade = pick.get("fade", 0)
-    early = (pick.get("from", -np.inf) - frame) / max(fade, step)
-    late = (frame - pick.get("until", np.inf)) / max(pick.get("fade_out", fade), step)
+    early = (pick.get("from", -np.inf) - frame) / max(fade, 1)
+    late = (frame - pick.get("until", np.inf)) / max(pick.get("fade_out", fade), 1)
     return float(np.clip(1 - max(early, late), 0, 1)) * on_path(pick, frame)[1]
 
 
@@ -420,7 +420,7 @@ def picks_at(document: Document, frame: float) -> Picks:
     found: list[Picked] = []
     for kind in ("hold", "pick"):
         for pick in document["edits"].get("picks", ()):
-            strength = strength_of(pick, frame, document["clip"]["frames"]["step"])
+            strength = strength_of(pick, frame)
             if pick["kind"] != kind or strength <= 0:
                 continue
             colour = on_path(pick, frame)[0]

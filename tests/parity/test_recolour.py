@@ -109,7 +109,7 @@ def test_the_core_has_the_changes_of_the_reference(picks: list[Document]) -> Non
         expected = [
             (on_path(one, at)[0], change_of(one, at), strength)
             for one in picks
-            if one["kind"] == "pick" and (strength := strength_of(one, at, 1)) > 0
+            if one["kind"] == "pick" and (strength := strength_of(one, at)) > 0
         ]
         assert len(found) == len(expected)
         for values, wanted in zip(found, expected, strict=True):

@@ -315,6 +315,23 @@ def test_another_file_is_opened_only_when_nothing_is_lost(
     assert session.document.grade.colour(id_) == (1.0, 0.0, 0.0)
 
 
+def test_a_file_with_the_palette_of_another_clip_brings_its_clip(
+    session: Session, sidecar: Path, tmp_path: Path
+) -> None:
+    """As when an analysis is undone that was of other frames or another folder."""
+    grey_levels(tmp_path, range(3, 6))
+    fields = json.loads(sidecar.read_text())
+    fields["clip"].update(name="f", source="clip.####.png")
+    sidecar.write_text(json.dumps(fields))
+    session.tick(LATER)
+    assert session.clip is not None
+    assert session.clip.frames == [3, 4, 5]
+    fields["clip"]["source"] = "gone.####.png"
+    sidecar.write_text(json.dumps(fields))
+    session.tick(2 * LATER)
+    assert session.clip is None  # else other pictures were shown as this clip's
+
+
 def test_edits_that_fail_become_the_status(session: Session) -> None:
     assert session.edit(lambda document: document.set("nowhere", rgb=(0, 0, 0))) is None
     assert session.status.level == "error"

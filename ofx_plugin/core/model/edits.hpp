@@ -39,7 +39,6 @@ struct Edits {
     std::vector<std::optional<Ramp>> vertex_ramp{};
     Ramp default_ramp = Ramp::kLinear;
     std::vector<Pick> picks{};
-    double frame_step = 1;         ///< frame numbers from one of the clip's frames to the next
     double width = 1, height = 1;  ///< of the clip, in pixels: where windows of picks are
     /// From the palette's code values to those of a display; null where they are the same.
     std::shared_ptr<const DisplayCurve> display{};

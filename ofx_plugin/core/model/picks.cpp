@@ -90,14 +90,14 @@ Vec3 Pick::change_at(double at) const {
     return std::max(0.0, part) * change;
 }
 
-double Pick::ramp_in(double step) const { return std::max(fade, step); }
+double Pick::ramp_in() const { return std::max(fade, 1.0); }
 
-double Pick::ramp_out(double step) const { return std::max(fade_out.value_or(fade), step); }
+double Pick::ramp_out() const { return std::max(fade_out.value_or(fade), 1.0); }
 
-double Pick::strength_at(double at, double step) const {
+double Pick::strength_at(double at) const {
     double strength = 1;
-    if (from) strength = std::min(strength, 1 - (*from - at) / ramp_in(step));
-    if (until) strength = std::min(strength, 1 - (at - *until) / ramp_out(step));
+    if (from) strength = std::min(strength, 1 - (*from - at) / ramp_in());
+    if (until) strength = std::min(strength, 1 - (at - *until) / ramp_out());
     if (!path.empty()) {
         const auto [before, after, weight] = around(path, at);
         strength *= before->there + weight * (after->there - before->there);

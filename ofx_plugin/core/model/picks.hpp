@@ -87,16 +87,16 @@ struct Pick {
 
     /// The learned matte, else that of the hue. Throws std::invalid_argument without either.
     const Matte& taken() const;
-    /// The time from no change to the full one, and back. `step` as in strength_at().
-    double ramp_in(double step) const;
-    double ramp_out(double step) const;
+    /// The frames from no change to the full one, and back: at least one, so that a range without
+    /// fades ends between two frames.
+    double ramp_in() const;
+    double ramp_out() const;
     /// Where the colour is at a frame.
     Vec3 colour_at(double frame) const;
     /// The whole change that is asked for at a frame, without ramps.
     Vec3 change_at(double frame) const;
-    /// How much of it is asked for, 0..1. `step`: frame numbers from one of the clip's frames to
-    /// the next; a range without fades takes one of them.
-    double strength_at(double frame, double step) const;
+    /// How much of it is asked for, 0..1.
+    double strength_at(double frame) const;
 };
 
 }  // namespace palette4d

@@ -134,7 +134,7 @@ std::vector<Moment> moments(const Edits& edits, double frame, bool hold) {
     std::vector<Moment> result;
     for (const Pick& pick : edits.picks) {
         if (!pick.enabled || pick.hold != hold) continue;
-        const double strength = pick.strength_at(frame, edits.frame_step);
+        const double strength = pick.strength_at(frame);
         if (!(strength > 0)) continue;
         const Vec3 colour = pick.colour_at(frame);
         const DisplayCurve* const curve = edits.display.get();

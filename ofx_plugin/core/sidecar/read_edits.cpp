@@ -57,7 +57,6 @@ void check_colours(const Cursor& colours) {
 Edits read_edits(const Cursor& where, const Sidecar& of) {
     const Polytope& polytope = of.polytope;
     Edits edits;
-    edits.frame_step = static_cast<double>(of.clip.step);
     edits.width = static_cast<double>(of.clip.width);
     edits.height = static_cast<double>(of.clip.height);
     edits.vertex_rgb.resize(polytope.vertices().size());

@@ -502,7 +502,7 @@ def _told(document: Document, pick: Pick, followed: bool = False, boxed: bool = 
         lines[0] += f"; from {start} until {until}{fade}"
     if not pick.enabled:
         return f"{lines[0]}; disabled"
-    if not pick.covers(pick.frame, document.grade.frames[2]):
+    if not pick.covers(pick.frame):
         lines.append(f"  note: frame {pick.frame:g} is outside of its range and does not change")
     if pick.path:
         lines += _path(pick)

@@ -331,7 +331,7 @@ def _unmarked(it: _Thing) -> Iterator[Note]:
     """Report areas that the user marked as the pick's, and that it does not take without holds."""
     pick = it.pick
     for area in pick.marks:
-        if (strength := pick.strength_at(area.frame, 1.0)) < 0.5:
+        if (strength := pick.strength_at(area.frame)) < 0.5:
             if area.frame != pick.frame:
                 yield Note(
                     f"{percent(strength)} of the change at frame {area.frame:g}, where you marked "
@@ -392,7 +392,7 @@ def _elsewhen(view: _View, pick: Pick, ranged: Pick) -> Iterator[Note]:
     assert clip is not None
     corrected = [nearest_frame(clip, key.frame) for key in pick.path if key.given]
     unfollowed = replace(ranged, path=())
-    inside = [n for n in corrected if unfollowed.strength_at(n, 1.0) > 0.5]
+    inside = [n for n in corrected if unfollowed.strength_at(n) > 0.5]
     some = inside[:: -(-len(inside) // MOST_CORRECTED) or 1]
     views = []
     for frame in sorted({*some, *further_frames(unfollowed, clip.frames)} - {view.frame}):

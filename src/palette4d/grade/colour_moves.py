@@ -97,8 +97,8 @@ def range_of(
             f"found the range {range_text(start, until)}{faded}; expected a range in order that "
             f"meets the clip, which has the frames {first} to {last}, and fades of 0 or more"
         )
-    # Nothing is between two frames, so that a fade of one step is a cut.
-    fades = (max(ramp, float(step)) for ramp in (fade_in, fade_out))
+    # Nothing is between two frames, so that a fade of one is a cut.
+    fades = (max(ramp, 1.0) for ramp in (fade_in, fade_out))
     return Range(float(begin), float(end), *fades)
 
 

@@ -44,8 +44,8 @@ class How(TypedDict, total=False):
     chroma, lightness : float
         Factors of 0 or more, in OKLCh of the displayed colour.
     start, until, fade, fade_out : float, optional
-        Only from frame `start` to `until`, with ramps of `fade` frames (at least one frame
-        step) before and after, and nothing beyond. A range without one end goes on to that end
+        Only from frame `start` to `until`, with ramps of `fade` frames (at least one)
+        before and after, and nothing beyond. A range without one end goes on to that end
         of the clip. `fade_out` is the length of the ramp after it, if that differs.
     ramp : {"linear", "smooth", "step"}, optional
         The ramp of the handles that move, or of the fades of a range.

@@ -149,7 +149,7 @@ def further_frames(pick: Pick, frames: Sequence[int]) -> list[int]:
     """Return frames spread over those at which all of the pick is asked for."""
     first = frames[0] if pick.start is None else pick.start
     last = frames[-1] if pick.until is None else pick.until
-    inside = [n for n in frames if first <= n <= last and pick.strength_at(n, 1.0) > 0.5]
+    inside = [n for n in frames if first <= n <= last and pick.strength_at(n) > 0.5]
     count = min(FURTHER_FRAMES, len(inside))
     return [inside[(2 * k + 1) * len(inside) // (2 * count)] for k in range(count)]
 

@@ -321,24 +321,25 @@ class Pick:
         part = np.where(size > 1e-9, room / np.maximum(size, 1e-9), 1.0)
         return change * min(light, max(0.0, float(part.min())))
 
-    def covers(self, frame: float, step: float) -> bool:
+    def covers(self, frame: float) -> bool:
         """Return whether a frame lies in the range or its ramps."""
-        begin, start, until, end = self.knots(step)
+        begin, start, until, end = self.knots
         return start <= frame <= until or begin < frame < end
 
-    def knots(self, step: float) -> tuple[float, float, float, float]:
-        """Return the frames where the ramp before begins and ends, and the ramp after.
+    @property
+    def knots(self) -> tuple[float, float, float, float]:
+        """The frames where the ramp before begins and ends, and the ramp after.
 
-        Without a fade the ramps take one frame of the clip (`step` frame numbers).
+        A ramp takes at least one frame: without a fade the range ends between two frames.
         """
         start = -math.inf if self.start is None else self.start
         until = math.inf if self.until is None else self.until
-        return start - max(self.fade, step), start, until, until + max(self.fades[1], step)
+        return start - max(self.fade, 1.0), start, until, until + max(self.fades[1], 1.0)
 
     def span(self, frames: tuple[int, int, int]) -> tuple[float, float]:
         """Return the first and the last frame of a clip's frames that the pick changes."""
-        first, last, step = frames
-        begin, _, _, end = self.knots(step)
+        first, last, _ = frames
+        begin, _, _, end = self.knots
         return max(begin, first), min(end, last)
 
     def lost(self, frames: tuple[int, int, int]) -> tuple[float | None, float | None]:
@@ -361,9 +362,9 @@ class Pick:
         """Frames of the ramps before and after the range."""
         return self.fade, self.fade if self.fade_out is None else self.fade_out
 
-    def strength_at(self, frame: float, step: float) -> float:
+    def strength_at(self, frame: float) -> float:
         """Return how much of the change is asked for at a frame, 0..1."""
-        begin, start, until, end = self.knots(step)
+        begin, start, until, end = self.knots
         before = (frame - begin) / (start - begin) if frame < start else 1.0
         after = (end - frame) / (end - until) if frame > until else 1.0
         return max(0.0, min(before, after)) * self._there(frame)

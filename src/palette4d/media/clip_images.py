@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.common.arguments import MAX_FRAMES, parse_frames
 from palette4d.common.message import Arg
-from palette4d.media import oiio_text
+from palette4d.media import dpx_alpha, oiio_text
 from palette4d.media.clip_base import (
     DEFAULT_RATE,
     F32,
@@ -127,6 +127,7 @@ class ImageClip(Clip):
         samples = np.asarray(stored)
         if chosen != list(range(first, last)):
             samples = samples[..., [channel - first for channel in chosen]]
+        samples = dpx_alpha.with_last(samples, path, header.bits)
         if not self.whole:
             samples = _in_display_window(samples, spec)
         return header, samples, spec

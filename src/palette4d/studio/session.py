@@ -489,11 +489,17 @@ class Session(Drafts):
             self._stamp = stamp
             self.say(f"{texts.BROKEN} {in_words(error)}", "error")
             return
+        former = None if self._document is None else self._document.grade.core.clip["source"]
         self._document, self._trial, self._dragged = loaded, None, None
         self._stamp, self._edited_at = stamp, None
-        self._find_display()
+        clip = loaded.grade.core.clip
+        if clip["source"] == former:
+            self._find_display()
+        else:  # an analysis of another clip, or one that was undone
+            self._set_clip(find_clip(self.path, clip, None))
         self.say(texts.RELOADED)
         self._changed()
+        self.go(self.frame)
 
 
 def recovery_files(sidecar: Path) -> Iterator[Path]:

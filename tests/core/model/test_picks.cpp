@@ -18,7 +18,7 @@ TEST(a_hold_changes_nothing) {
         hold.toward_colour = toward;
         CHECK(same_bits(hold.change_at(3), {0, 0, 0}));
     }
-    CHECK_EQUAL(hold.strength_at(3, 1), 1.0);
+    CHECK_EQUAL(hold.strength_at(3), 1.0);
 }
 
 TEST(a_pick_has_its_own_matte_or_that_of_its_hue) {
