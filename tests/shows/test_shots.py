@@ -33,10 +33,11 @@ def test_names_are_unlike_and_stay() -> None:
 
 
 def test_names_of_an_earlier_run_stay_with_their_frames() -> None:
-    former = {"A": (0, 9), "a_f20": (20, 29), "A_f40": (40, 49), "A_f3": (3, 4), "B": (0, 9)}
+    former = [shot("A"), shot("a_f20", 20, 29), shot("A_f40", 40, 49), shot("A_f3", 3, 4)]
+    former.append(shot("B"))
 
     def names(*firsts: int) -> list[str]:
-        listed = [dataclasses.replace(shot("A", at), used=(at, at + 9)) for at in firsts]
+        listed = [shot("A", at, at + 9) for at in firsts]
         return [one.name for one in shots.numbered(listed, former)[0]]
 
     assert names(40, 20, 0) == ["A_f40", "a_f20", "A"]
@@ -44,6 +45,25 @@ def test_names_of_an_earlier_run_stay_with_their_frames() -> None:
     assert names(21, 20, 45, 42) == ["A", "a_f20", "A_f45", "A_f40"]
     # One of other frames may have a name that is free.
     assert names(70, 80) == ["A", "A_f80"]
+
+
+def test_names_go_with_the_media_where_several_have_one_name() -> None:
+    def of(clip: str, first: int, name: str = "A") -> shots.Shot:
+        return dataclasses.replace(shot(name, first, first + 9), clip=clip)
+
+    former = [of("x/a.mov", 0), of("y/a.mov", 0, "A_f0"), of("y/a.mov", 50, "A_f50")]
+    now = [of("y/a.mov", 1), of("y/a.mov", 50), of("z/a.mov", 0), of("x/a.mov", 5)]
+    assert [one.name for one in shots.numbered(now, former)[0]] == ["A_f0", "A_f50", "A_f0_2", "A"]
+    # Media that moved keep names by their frames.
+    moved = [of("new/a.mov", 51), of("new/a.mov", 1)]
+    assert [one.name for one in shots.numbered(moved, former)[0]] == ["A_f50", "A"]
+
+
+def test_very_many_shots_of_one_name_are_named_at_once() -> None:
+    many = [shot("A", at % 50, at % 50) for at in range(20_000)]
+    named, _ = shots.numbered(many)
+    again, _ = shots.numbered([dataclasses.replace(one, name="A") for one in named], named)
+    assert {one.name for one in again} == {one.name for one in named}
 
 
 def test_a_movie_is_split_at_its_cut(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from palette4d.media.clip import open_clip
 from palette4d.media.colour_space import SpaceOptions
 from palette4d.shows import find_media, shots, timeline_clips, timeline_files, timeline_shots
 from palette4d.shows import manifest as manifests
-from palette4d.shows.batch import Show, ShowOptions, Source, analyse
+from palette4d.shows.batch import Show, ShowOptions, Source, analyse, stored_name
 from palette4d.shows.manifest import FAILED
 from palette4d.shows.shots import Shot
 from palette4d.shows.timeline_files import is_timeline
@@ -153,7 +153,8 @@ def _of_timeline(
     source = Source(file_safe(path.stem), str(path), sha256, timeline.rate)
     manifest = manifests.path_of(into, source.name)
     before = manifests.read(manifest).entries if manifest.exists() else ()
-    named, renamed = shots.numbered(listed, {each.shot.name: each.shot.used for each in before})
+    clips = [stored_name(shot.clip, into) for shot in listed]
+    named, renamed = shots.numbered(listed, [each.shot for each in before], clips)
     notes = [f"not analysed: {note}" for note in timeline.notes] + counting
     if timeline_files.is_edl(path) and rate is None:
         notes.append(

@@ -302,9 +302,7 @@ class Show:
 
     def beside(self, clip: str) -> str:
         """Return a path relative to the folder, so that both may move together."""
-        if not clip or Path(clip).is_absolute():
-            return clip
-        return beside(Path(clip), self.folder)
+        return stored_name(clip, self.folder)
 
     def take(self, name: str, outcome: Analysed | Failed) -> None:
         """Write a sidecar, or record the failure."""
@@ -340,6 +338,11 @@ class Show:
         total = sum(counts[name] for name in [*self.kept, *self.tasks])
         ready = sum(entry.status == DONE for entry in self.entries.values())
         return total - left, total, f"{ready} of {counted(len(self.entries), 'shot')}"
+
+
+def stored_name(clip: str, folder: Path) -> str:
+    """Return the path of a shot's clip as the manifest in a folder states it."""
+    return clip if not clip or Path(clip).is_absolute() else beside(Path(clip), folder)
 
 
 def _given(options: Mapping[str, Any]) -> dict[str, str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from palette4d.analysis import colour_statistics
 from palette4d.analysis.options import AnalysisOptions
@@ -20,6 +20,9 @@ from palette4d.shows.edl_cdl import Cdl
 
 #: Largest number of colours per frame in the search for cuts.
 BINS = 4096
+#: Former shots of one name above which only the same frames are looked for: each is compared with
+#: each.
+MOST_ALIKE = 1000
 #: What `numbered` adds to a name.
 _SUFFIX = re.compile(r"_f-?\d+(_\d+)?$")
 
@@ -93,15 +96,16 @@ def words_of_speed(speed: float) -> str:
 
 
 def numbered(
-    shots: Sequence[Shot], former: Mapping[str, tuple[int, int]] | None = None
+    shots: Sequence[Shot], former: Sequence[Shot] = (), clips: Sequence[str] = ()
 ) -> tuple[list[Shot], list[str]]:
     """Return the shots with unique names, and the names that changed.
 
     If several shots have one name, the first keeps it. The others get their first frame as a
-    suffix: `A`, `A_f120`. `former` are the names of an earlier run and the frames that they had: a
-    shot of the same frames, or else of most of them, keeps its name wherever it stands now.
+    suffix: `A`, `A_f120`. `former` are the shots of an earlier run, and `clips` the clips of
+    `shots` as these state them: a shot of the same frames, or else of most of them, keeps its name
+    wherever it stands now; of several media, a shot of the same one goes first.
     """
-    names = _kept_names(shots, former or {})
+    names = _kept_names(shots, former, clips or [shot.clip for shot in shots])
     taken = {name.casefold() for name in names.values()}
     numbers: dict[str, Iterator[int]] = {}
     for i, shot in enumerate(shots):
@@ -119,32 +123,37 @@ def numbered(
     return out, [now.name for now, shot in zip(out, shots, strict=True) if now.name != shot.name]
 
 
-def _kept_names(shots: Sequence[Shot], former: Mapping[str, tuple[int, int]]) -> dict[int, str]:
+def _kept_names(
+    shots: Sequence[Shot], former: Sequence[Shot], clips: Sequence[str]
+) -> dict[int, str]:
     """Return the former names of shots by their places in the list."""
+    alike: dict[str, list[Shot]] = {}
+    same: dict[tuple[str, str, tuple[int, int]], list[Shot]] = {}
+    for shot in reversed(former):
+        for own in {shot.name.casefold(), _SUFFIX.sub("", shot.name.casefold())}:
+            alike.setdefault(own, []).append(shot)
+            same.setdefault((own, shot.clip, shot.used), []).append(shot)
     kept: dict[int, str] = {}
-    same: dict[tuple[str, tuple[int, int]], list[str]] = {}
-    alike: dict[str, list[str]] = {}
-    for name, used in former.items():
-        for own in {name.casefold(), _SUFFIX.sub("", name.casefold())}:
-            same.setdefault((own, used), []).append(name)
-            alike.setdefault(own, []).append(name)
     taken: set[str] = set()
+
+    def keep(i: int, name: str) -> None:
+        if i not in kept and name not in taken:
+            kept[i] = name
+            taken.add(name)
+
     for i, shot in enumerate(shots):
-        names = same.get((shot.name.casefold(), shot.used), [])
-        for name in [name for name in names if name not in taken][:1]:
-            kept[i] = name
-            taken.add(name)
-    pairs = [
-        (min(shot.used[1], former[name][1]) - max(shot.used[0], former[name][0]) + 1, i, name)
-        for i, shot in enumerate(shots)
-        if i not in kept
-        for name in alike.get(shot.name.casefold(), [])
-        if name not in taken
-    ]
-    for shared, i, name in sorted(pairs, key=lambda pair: -pair[0]):
-        if shared > 0 and i not in kept and name not in taken:
-            kept[i] = name
-            taken.add(name)
+        whole = same.get((shot.name.casefold(), clips[i], shot.used), [])
+        while whole and i not in kept:
+            keep(i, whole.pop().name)
+    pairs = []
+    for i, shot in enumerate(shots):
+        others = [] if i in kept else alike.get(shot.name.casefold(), [])
+        for other in others if len(others) <= MOST_ALIKE else []:
+            first, last = max(shot.used[0], other.used[0]), min(shot.used[1], other.used[1])
+            if first <= last:
+                pairs.append((other.clip != clips[i], first - last, i, other.name))
+    for _, _, i, name in sorted(pairs):
+        keep(i, name)
     return kept
 
 
