@@ -138,6 +138,12 @@ std::vector<fs::path> search_folders(const std::string& folder) {
     return folders;
 }
 
+/// Whether a name's number, which begins there, is a mark such as #### and no number.
+bool is_mark(const std::string& stem, std::size_t begin) {
+    const std::size_t digit = stem.find_first_of("0123456789", begin);
+    return digit == std::string::npos || stem.find_first_of("#@%", begin) != std::string::npos;
+}
+
 std::string name_of(const std::string& media) {
     return clip_name(native(media).filename().u8string());
 }
@@ -182,21 +188,11 @@ std::string clip_spec(const std::string& media) {
     const fs::path file = native(media);
     if (!is_still(file.filename().u8string())) return media;
     std::string stem = file.stem().u8string();
-    std::size_t begin = stem.find_first_of("0123456789", without_number(stem));
-    if (begin == std::string::npos) return media;
-    const std::size_t digits = stem.find_first_not_of("0123456789", begin);
-    const std::size_t width = std::min(digits, stem.size()) - begin;
-    std::size_t end = begin + width;
-    if (begin > 0 && stem[begin - 1] == '[') {
-        const std::size_t close = stem.find(']', begin);
-        if (close != std::string::npos) {
-            --begin;
-            end = close + 1;
-        }
-    } else if (begin > 0 && stem[begin - 1] == '%') {
-        return media;
-    }
-    stem.replace(begin, end - begin, width, '#');
+    const std::size_t begin = number_start(stem);
+    if (begin == std::string::npos || is_mark(stem, begin)) return media;
+    const std::size_t first = stem.find_first_of("0123456789", begin);
+    const std::size_t digits = std::min(stem.find_first_not_of("0123456789", first), stem.size());
+    stem.replace(begin, std::string::npos, digits - first, '#');
     return (file.parent_path() / native(stem + file.extension().u8string())).u8string();
 }
 
@@ -204,11 +200,11 @@ std::optional<double> first_number(const std::string& media) {
     const fs::path file = native(media);
     if (!is_still(file.filename().u8string())) return std::nullopt;
     const std::string stem = file.stem().u8string();
-    const std::string rest = stem.substr(without_number(stem));
-    const std::size_t digit = rest.find_first_of("0123456789");
-    if (digit == std::string::npos) return std::nullopt;
-    return std::strtod(
-        rest.substr(digit, rest.find_first_not_of("0123456789", digit) - digit).c_str(), nullptr);
+    const std::size_t begin = number_start(stem);
+    if (begin == std::string::npos || is_mark(stem, begin)) return std::nullopt;
+    const std::string number = stem.substr(stem[begin] == '[' ? begin + 1 : begin);
+    return std::strtod(number.substr(0, number.find_first_not_of("0123456789", 1)).c_str(),
+                       nullptr);
 }
 
 bool same_clip(const std::string& media, const std::string& source) {

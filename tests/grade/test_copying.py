@@ -307,6 +307,34 @@ def test_the_grade_is_copied_beyond_a_stop_and_to_another_encoding(
     assert (tmp_path / "clip.former.p4d.json").exists()
 
 
+def test_edits_between_analysed_frames_are_copied() -> None:
+    """A palette of each fifth frame gets what a palette of every frame has in between."""
+    source = Document(members("split"))
+    source.adjust("v1", track=True, by=(0.3, 0.2, 0), start=6, until=8)
+    when = {"start": 6, "until": 8, "follow": False}
+    source.pick(frame=7, colour=(0.5, 0.5, 0.5), by=(0.2, 0, 0), **when)
+    sparse = members("split")
+    sparse["clip"]["frames"]["step"] = 5
+    for time in ("same", "relative"):
+        target = Document(copy.deepcopy(sparse))
+        target.copy_from(source, time=time)
+        (pick,) = target.grade.picks
+        assert (pick.start, pick.until) == (6, 8)
+        assert worst(target, source, [(t, t) for t in range(21)]) < 4 / 255
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "time"),
+    [(0, 20, "same"), (5, 25, "same"), (10, 40, "same"), (21, 41, "relative"), (1000, 1020, "")],
+)
+def test_clips_with_frame_numbers_in_common_keep_edits_at_them(
+    first: int, last: int, time: str
+) -> None:
+    own = {"source": "v2.mov", "frames": {"first": first, "last": last}}
+    former = {"source": "v1.mov", "frames": {"first": 0, "last": 20}}
+    assert reanalysis._time(own, former) == (time or "relative")
+
+
 def test_picks_are_copied() -> None:
     source = Document(members("split"))
     seen = source.grade.palette(8).rgb.mean(axis=0).tolist()

@@ -237,6 +237,10 @@ TEST(a_still_stands_for_its_sequence) {
         {"/a/shot.[1001-1100].exr", "/a/shot.####.exr"},
         {"/a/shot.####.exr", "/a/shot.####.exr"},
         {"/a/shot.%04d.exr", "/a/shot.%04d.exr"},
+        {"/a/shot-0010.exr", "/a/shot-####.exr"},
+        {"/a/shot.-0003.exr", "/a/shot.####.exr"},
+        {"/a/shot.1001-1100#.exr", "/a/shot.1001-1100#.exr"},
+        {"/a/world0001.exr", "/a/world####.exr"},
         {"/a/v2/plate.exr", "/a/v2/plate.exr"},
         {"/a/take3.mov", "/a/take3.mov"},
     };

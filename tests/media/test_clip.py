@@ -122,6 +122,8 @@ def test_every_pattern_finds_the_sequence(tmp_path, pattern):
         "2026-11-28-",
         "take2_",
         "take#2_",
+        "me@home_",
+        "logo@2x_",
         "a1,",
         "x%d_",
         "$F",

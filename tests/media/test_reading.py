@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import OpenEXR
 import pytest
-from clip_files import write_image
+from clip_files import grey_levels, write_image
 from deliveries import PLAIN, movie, render, tiles
 
 from palette4d import analyze
@@ -16,7 +16,7 @@ from palette4d.grade import rendering
 from palette4d.grade.document import Document
 from palette4d.media.clip import ClipError, open_clip
 from palette4d.media.reading import read_as
-from palette4d.media.source_clip import find_clip
+from palette4d.media.source_clip import find_clip, frame_colours
 
 
 def layers(path):
@@ -148,3 +148,15 @@ def test_a_sidecar_remembers_how_its_clip_is_read(tmp_path):
         np.testing.assert_array_equal(found.read(1), expected)
     rendering.render(kept, source, tmp_path / "o.#.exr")
     np.testing.assert_array_equal(open_clip(str(tmp_path / "o.1.exr")).read(1), expected)
+
+
+def test_colours_come_from_frames_of_the_palettes_numbers(tmp_path):
+    own = {"name": "c", "source": "gone.####.png", "first": 1001, "last": 1005}
+    sidecar = tmp_path / "c.p4d.json"
+    near = str(grey_levels(tmp_path / "near", range(1003, 1010)) / "clip.####.png")
+    assert frame_colours(sidecar, own, 1001, near)[1] == 1003  # the nearest of those that it has
+    other = str(grey_levels(tmp_path / "other", range(1, 6)) / "clip.####.png")
+    with pytest.raises(Palette4dError, match=r"1-5.* 1001 to 1005"):
+        frame_colours(sidecar, own, 1001, other)
+    assert frame_colours(sidecar, own, 1001, other.replace("####", "0002"))[1] == 2  # a still
+    assert frame_colours(sidecar, own, 1001, None) == (None, None)

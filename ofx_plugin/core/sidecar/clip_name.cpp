@@ -69,20 +69,48 @@ bool is_still(const std::string& file_name) {
     return false;
 }
 
-std::size_t without_number(const std::string& stem) {
-    const std::size_t end = stem.find_last_not_of("0123456789#@%d[]-");
-    if (end == std::string::npos || end + 1 == stem.size()) return stem.size();
-    if (lower(stem[end]) == 'v' &&
-        (end == 0 || std::string("._- ").find(stem[end - 1]) != std::string::npos)) {
-        return stem.size();
+std::size_t number_start(const std::string& stem) {
+    const char* const digits = "0123456789";
+    const std::size_t end = stem.size();
+    // Where the characters of a set begin that end before `from`.
+    const auto run = [&](const char* set, std::size_t from) {
+        return from == 0 ? from : stem.find_last_not_of(set, from - 1) + 1;
+    };
+    const auto is_one_of = [&](const char* set, std::size_t at) {
+        return std::string(set).find(stem[at]) != std::string::npos;
+    };
+    std::size_t begin = run(digits, end);
+    if (begin < end) {
+        if (begin > 0 && lower(stem[begin - 1]) == 'v' &&
+            (begin == 1 || is_one_of("._- ", begin - 2))) {
+            return std::string::npos;
+        }
+    } else if (end > 0 && stem[end - 1] == ']') {
+        const std::size_t open = stem.rfind('[');
+        if (open != std::string::npos &&
+            stem.find_first_not_of("0123456789-,x#@%d", open + 1) == end - 1) {
+            begin = open;
+        }
+    } else if (end > 0 && is_one_of("#@", end - 1)) {
+        begin = run(stem[end - 1] == '#' ? "#" : "@", end);
+        const std::size_t range = run("0123456789-x,", begin);
+        if (range == 0 || is_one_of("._ ", range - 1)) begin = range;
+    } else if (end > 0 && stem[end - 1] == 'd') {
+        const std::size_t width = run(digits, end - 1);
+        if (width > 0 && stem[width - 1] == '%') begin = width - 1;
     }
-    const std::size_t name = stem.find_last_not_of("._- ", end);
-    return name == std::string::npos ? stem.size() : name + 1;
+    if (begin == end) return std::string::npos;
+    const bool is_signed = begin > 0 && stem[begin - 1] == '-' &&
+                           (begin == 1 || is_one_of("._ ", begin - 2));
+    return is_signed ? begin - 1 : begin;
 }
 
 std::string clip_name(const std::string& file_name) {
     const std::string stem = file_name.substr(0, stem_length(file_name));
-    return is_still(file_name) ? stem.substr(0, without_number(stem)) : stem;
+    const std::size_t number = is_still(file_name) ? number_start(stem) : std::string::npos;
+    if (number == 0 || number == std::string::npos) return stem;
+    const std::size_t last = stem.find_last_not_of("._- ", number - 1);
+    return last == std::string::npos ? stem : stem.substr(0, last + 1);
 }
 
 std::string file_safe(const std::string& name, std::size_t longest) {

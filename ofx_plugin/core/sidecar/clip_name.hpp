@@ -12,9 +12,10 @@ inline constexpr const char* kSidecarEnding = ".p4d.json";
 /// Whether a file's name, in UTF-8 and without folders, has the extension of an image.
 bool is_still(const std::string& file_name);
 
-/// The length of a name without extension and without the frame number, or its placeholder, at its
-/// end. The 2 of "plate_v2" is a version, not a frame.
-std::size_t without_number(const std::string& stem);
+/// Where the frame number at the end of a name without extension begins, or its mark: 1001, -0003,
+/// ####, %04d, [1001-1100]; npos without one. A minus is a sign at the start and after another
+/// separator: "sh010-0010" is frame 10. The 2 of "plate_v2" is a version, not a frame.
+std::size_t number_start(const std::string& stem);
 
 /// A media file's name without its extension and, for an image, without its frame number:
 /// `shot.mov`, `shot.1001.exr` and `shot.####.exr` are all of `shot`.

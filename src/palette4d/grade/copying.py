@@ -5,7 +5,7 @@ corresponding time. Stops are added where the change along an edge is not linear
 again from the target's clip: there their colour is, connected, or they are not copied.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -27,6 +27,7 @@ from palette4d.grade.keyframes import needed
 from palette4d.grade.pick_edits import taken
 from palette4d.grade.picks import Pick
 from palette4d.grade.versions import with_active_kept
+from palette4d.media.source_clip import nearest
 
 F64 = NDArray[np.float64]
 Time = Literal["relative", "same"] | float
@@ -156,6 +157,19 @@ class Match:
         return between(own, other, configs), between(other, own, configs)
 
     @property
+    def knots(self) -> list[float]:
+        """The target's times of the source's vertices and stops: between them it goes along lines.
+
+        They may lie between frames that were analysed.
+        """
+        if not isinstance(self.time, str):
+            return []
+        stops = [stop.frame for stop in self.source.settings.values() if stop.frame is not None]
+        own = {vertex["frame"] for vertex in self.source.members["polytope"]["vertices"]}
+        first, last, _ = self.target.frames
+        return [frame for frame in map(self.back, own.union(stops)) if first <= frame <= last]
+
+    @property
     def pace(self) -> float:
         """Frames of the target for one frame of the source."""
         return self.back(1.0) - self.back(0.0)
@@ -181,10 +195,14 @@ def copied(
     if not source.edited:
         raise Palette4dError(f"{source.name} has no edits; expected a graded palette to copy from")
     match = _match(target, source, time)
-    state = dict(_handles(target, _grade(match, source.only(*HANDLES))))
+    state = dict(_handles(match, _grade(match, source.only(*HANDLES))))
     kept, _ = with_active_kept(target, "before copy")
     after = kept.with_state({**kept.of_kind("version", "note", "lock"), **state})
-    picks = (_pick(match, pick, same_clip) for pick in source.picks)
+    first, last, step = target.frames
+    opened = clip.open()
+    there = None if opened is None else [n for n in opened.frames if first <= n <= last]
+    frames = there or range(first, last + 1, step)
+    picks = (_pick(match, pick, frames, same_clip=same_clip) for pick in source.picks)
     after, left_out, away = taken(after, clip, [pick for pick in picks if pick is not None])
     copies = {pick.id: pick for pick in after.picks}
     everywhere = [
@@ -193,7 +211,7 @@ def copied(
         if pick.window and pick.id in copies and not copies[pick.id].window
     ]
     unlearned = [
-        pick.id for pick in source.picks if pick.matte and pick.id in copies and clip.open() is None
+        pick.id for pick in source.picks if pick.matte and pick.id in copies and opened is None
     ]
     label = f"copy the grade of {source.members['clip']['name']}"
     measured = fit(after, source, time)
@@ -262,8 +280,9 @@ def _grade(match: Match, source: Grade) -> Callable[[F64, float], F64]:
     return graded
 
 
-def _handles(target: Grade, graded: Callable[[F64, float], F64]) -> Iterator[tuple[Key, Setting]]:
+def _handles(match: Match, graded: Callable[[F64, float], F64]) -> Iterator[tuple[Key, Setting]]:
     """Yield the settings of vertices, and of the stops that edges need."""
+    target = match.target
     polytope = target.members["polytope"]
     vertices = {vertex["id"]: vertex for vertex in polytope["vertices"]}
     taken = {*vertices, *(edge["id"] for edge in polytope["edges"])}
@@ -277,7 +296,7 @@ def _handles(target: Grade, graded: Callable[[F64, float], F64]) -> Iterator[tup
 
     first, last, step = target.frames
     before_at: dict[str, list[tuple[float, F64, F64]]] = {}
-    for frame_at in frames_between(first, last, step):
+    for frame_at in sorted({*frames_between(first, last, step), *match.knots}):
         palette = target.palette(frame_at)
         after = graded(palette.rgb, frame_at)
         for id_, colour, new in zip(palette.ids, palette.rgb, after, strict=True):
@@ -294,8 +313,11 @@ def _handles(target: Grade, graded: Callable[[F64, float], F64]) -> Iterator[tup
             yield ("handle", id_), Setting(as_colour(new.tolist()), edge["id"], frame)
 
 
-def _pick(match: Match, pick: Pick, same_clip: bool) -> Pick | None:
-    """Return a pick as it is in the target, or None if it does nothing at the chosen frame."""
+def _pick(match: Match, pick: Pick, frames: Sequence[int], *, same_clip: bool) -> Pick | None:
+    """Return a pick as it is in the target, or None if it does nothing at the chosen frame.
+
+    `frames` are those of the target's clip.
+    """
     _, into = match.conversions
 
     def colour(rgb: ArrayLike) -> Colour:
@@ -303,8 +325,12 @@ def _pick(match: Match, pick: Pick, same_clip: bool) -> Pick | None:
         return as_colour((own if into is None else into(own)).tolist())
 
     def time(frame: float) -> int:
-        first, _, step = match.target.frames
-        return first + step * round((match.back(frame) - first) / step)
+        return nearest(frames, round(match.back(frame)))
+
+    def end(frame: float | None) -> float | None:
+        if frame is None or match.time == "same":
+            return frame
+        return float(round(match.back(frame)))
 
     always: dict[str, Any] = {"start": None, "until": None, "fade": 0.0, "fade_out": None}
     copy = replace(pick, path=(), matte=None, **always)
@@ -321,9 +347,9 @@ def _pick(match: Match, pick: Pick, same_clip: bool) -> Pick | None:
 
     if isinstance(match.time, str):
         first, last, _ = match.target.frames
-        keys = {time(key.frame): key for key in pick.path if first <= time(key.frame) <= last}
-        frame = min(max(time(pick.frame), first), last)
-        if frame == time(pick.frame):
+        keys = {time(k.frame): k for k in pick.path if first <= match.back(k.frame) <= last}
+        frame = time(pick.frame)
+        if first <= match.back(pick.frame) <= last:
             copy = replace(copy, rgb=colour(pick.rgb))
         else:  # it was picked at a frame that is not in the target
             copy = replace(picked_at(match.there(frame)), pixel=None, box=None)
@@ -331,8 +357,8 @@ def _pick(match: Match, pick: Pick, same_clip: bool) -> Pick | None:
             copy,
             frame=frame,
             areas=tuple(area for area in copy.areas if first <= area.frame <= last),
-            start=None if pick.start is None else time(pick.start),
-            until=None if pick.until is None else time(pick.until),
+            start=end(pick.start),
+            until=end(pick.until),
             fade=pick.fade * match.pace,
             fade_out=None if pick.fade_out is None else pick.fade_out * match.pace,
             path=tuple(replace(keys[f], frame=f, rgb=colour(keys[f].rgb)) for f in sorted(keys)),

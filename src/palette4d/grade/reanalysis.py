@@ -100,12 +100,12 @@ def _copied(
 def _time(own: Fields, other: Fields) -> Literal["relative", "same"]:
     """Return how the frames of a new analysis correspond to the former ones.
 
-    A clip that got frames, or lost some, keeps the numbers of the others.
+    Clips that have numbers in common have these frames in common.
     """
     first, last, begin, end = (
         clip["frames"][name] for clip in (own, other) for name in ("first", "last")
     )
-    overlap = first <= end and begin <= last and last - first != end - begin
+    overlap = first <= end and begin <= last
     return "same" if own["source"] == other["source"] or overlap else "relative"
 
 

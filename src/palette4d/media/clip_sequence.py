@@ -37,8 +37,8 @@ _ANONYMOUS = re.compile(
 )
 _FOLDERS_TO_NAME_BY = 3
 # The mark for the frame number in a pattern, and a range before it: numbers with a separator before
-# them, as in "name.1001-1100#.exr", "name.1-10x2,15#.exr".
-_PADDING = re.compile(r"#+|@+|(%[0-9]*d|\$F[0-9]*)(?![A-Za-z])")
+# them, as in "name.1001-1100#.exr", "name.1-10x2,15#.exr". No mark is in "logo@2x.png".
+_PADDING = re.compile(r"#+|@+(?![A-Za-z0-9@])|(%[0-9]{0,2}d|\$F[0-9]{0,2})(?![A-Za-z])")
 _ONE_RANGE = r"-?[0-9]+(--?[0-9]+(x[0-9]+)?)?"
 _RANGE = re.compile(rf"((?<=[._ ])|\A){_ONE_RANGE}(,{_ONE_RANGE})*\Z")
 # "shot_v2" is version 2, not frame 2.

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import names_a_server
 from palette4d.media.clip import Clip, open_clip
+from palette4d.media.clip_base import describe
 from palette4d.media.reading import like_source
 
 
@@ -64,12 +65,19 @@ def frame_colours(
     """Read the colours of the clip's frame nearest to a time, and that frame's number.
 
     The colours are (h, w, 3) float32, straight (`Clip.straight_colours`): NaN where alpha is 0.
-    None, None if no clip was given and the sidecar's clip cannot be found or read.
+    None, None if no clip was given and the sidecar's clip cannot be found or read. A single picture
+    may be given for any time; several frames must have the numbers of the sidecar's.
     """
     opened = find_clip(sidecar_path, clip, given)
     if opened is None:
         return None, None
     number = nearest_frame(opened, frame)
+    first, last = clip["first"], clip["last"]
+    if given is not None and len(opened.frames) > 1 and not first <= number <= last:
+        raise Palette4dError(
+            f"{given}: found the frames {describe(opened.frames)}, expected those of the palette, "
+            f"{first} to {last}; other frames have other colours"
+        )
     try:
         return opened.straight_colours(opened.read(number)), number
     except (Palette4dError, OSError):
