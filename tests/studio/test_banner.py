@@ -216,3 +216,14 @@ def test_after_a_crash_the_sidecar_is_offered_again(
     assert frames_of(kept) == {str(sidecar): 3}
     window.files.offer_crashed()
     assert not said(window)
+
+
+def test_a_config_that_cannot_be_used_is_told(
+    window: Window, sidecar: Path, settle: Settle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The picture comes through another one: a colourist would grade what nobody else sees."""
+    monkeypatch.setenv("OCIO", "/no/such/config.ocio")
+    window.open_path(str(sidecar))
+    settle(window)
+    assert "/no/such/config.ocio: found no config there" in said(window)
+    assert "ocio://" in said(window)

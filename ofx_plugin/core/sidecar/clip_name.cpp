@@ -100,8 +100,8 @@ std::size_t number_start(const std::string& stem) {
         if (width > 0 && stem[width - 1] == '%') begin = width - 1;
     }
     if (begin == end) return std::string::npos;
-    const bool is_signed = begin > 0 && stem[begin - 1] == '-' &&
-                           (begin == 1 || is_one_of("._ ", begin - 2));
+    const bool is_signed =
+        begin > 0 && stem[begin - 1] == '-' && (begin == 1 || is_one_of("._ ", begin - 2));
     return is_signed ? begin - 1 : begin;
 }
 

@@ -125,6 +125,11 @@ class Banner(QFrame):
         display = session.display
         unknown = found[1] is not None and display is not None and not display.known
         self._state("encoding", unknown, texts.ASSUMED, self._change)
+        if found[1] is not None and display is not None and display.problem:
+            other = texts.OTHER_CONFIG.format(problem=display.problem, config=display.name)
+            self.tell("config", other, "warning", {})
+        else:
+            self.drop("config")
         left = texts.UNFOLLOWED.format(ids=", ".join(ids := session.unfollowed))
         self._state("follow", bool(ids), left, self._follow)
         again: Remedies = {texts.TRY_AGAIN: self._read_clip_again}

@@ -70,6 +70,7 @@ CHANGE, REOPEN = "Change…", "Reopen"
 OPEN_COPY, DISCARD_COPY = "Open the copy", "Discard it"
 FOLLOW_NOW, UNFOLLOWED = "Follow now", "Not followed through the clip yet: {ids}."
 ASSUMED = "The clip does not state its colour space. Its code values are shown as they are."
+OTHER_CONFIG = "{problem}. The picture is shown through the config {config}."
 CRASHED = "{name} was open in a window that ended without closing. Its edits are in the file."
 TRY_SAMPLE = "Try the sample"
 
