@@ -56,7 +56,7 @@ std::shared_ptr<const DisplayCurve> curve_from(const py::object& object) {
     return std::make_shared<const DisplayCurve>(DisplayCurve{from, to, values});
 }
 
-using GivenWindow = std::optional<std::tuple<PickWindow::Box, double>>;
+using GivenWindow = std::optional<std::tuple<PickWindow::Box, double, bool>>;
 
 FramePicks frame_picks(const std::vector<std::tuple<Vec3, Vec3, double, FloatArray>>& picks,
                        const py::object& left, const py::object& display,
@@ -75,8 +75,8 @@ FramePicks frame_picks(const std::vector<std::tuple<Vec3, Vec3, double, FloatArr
     }
     for (std::size_t i = 0; i < windows.size(); ++i) {
         if (!windows[i]) continue;
-        const auto& [box, feather] = *windows[i];
-        result.picks[i].window.emplace(PickWindow{feather, {{0, box}}}, 0);
+        const auto& [box, feather, inverted] = *windows[i];
+        result.picks[i].window.emplace(PickWindow{feather, {{0, box}}, inverted}, 0);
     }
     result.width = size[0];
     result.height = size[1];
@@ -113,7 +113,8 @@ py::list windows_of(const FramePicks& self) {
     py::list result;
     for (const FramePick& pick : self.picks) {
         if (pick.window) {
-            result.append(py::make_tuple(pick.window->box, pick.window->feather));
+            const FrameWindow& window = *pick.window;
+            result.append(py::make_tuple(window.box, window.feather, window.inverted));
         } else {
             result.append(py::none());
         }
@@ -175,8 +176,8 @@ void bind_picks(py::module_& module) {
              py::arg("size") = std::array<double, 2>{1, 1},
              "(colour, change, strength, (96, 96, 16) float32) of each pick; what holds leave of "
              "the palette's changes; (from, to, values) of a curve to display code values; each "
-             "pick's window, or None: (left, top, right, bottom) and a feather, in pixels; the "
-             "clip's width and height.")
+             "pick's window, or None: (left, top, right, bottom) and a feather, in pixels, and "
+             "whether it is inverted; the clip's width and height.")
         .def("with_changes", &with_changes, py::arg("changes"), "The same picks with others.")
         .def("of_part", &of_part, py::arg("part"),
              "The same picks of a part of the picture: (left, top, right, bottom), in pixels.")

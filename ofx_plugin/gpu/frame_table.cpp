@@ -163,7 +163,8 @@ void add_grid(const FrameMatte& matte, float idle, Writer& to, std::vector<float
     }
 }
 
-/// Adds a pick's window: its sides and 1 / its feather, in pixels of the window that is drawn.
+/// Adds a pick's window: its sides and 1 / its feather, in pixels of the window that is drawn. That
+/// across is negative if the window is inverted.
 void add_window(const std::optional<FrameWindow>& window, const FramePicks& picks,
                 const CleanUp::Place* place, Writer& to) {
     if (!window || !place) {
@@ -175,8 +176,9 @@ void add_window(const std::optional<FrameWindow>& window, const FramePicks& pick
     const auto x = [&](float side) { return side / at.width - static_cast<double>(at.column); };
     const auto y = [&](float side) { return static_cast<double>(at.row) + 1 - side / at.height; };
     const auto& [left, top, right, bottom] = window->box;
-    for (const double value : {x(left), y(bottom), x(right), y(top), at.width / window->feather,
-                               at.height / window->feather}) {
+    const double across = at.width / window->feather * (window->inverted ? -1 : 1);
+    for (const double value :
+         {x(left), y(bottom), x(right), y(top), across, at.height / window->feather}) {
         to.number(value);
     }
 }

@@ -141,7 +141,7 @@ std::vector<fs::path> search_folders(const std::string& folder) {
 /// Whether a name's number, which begins there, is a mark such as #### and no number.
 bool is_mark(const std::string& stem, std::size_t begin) {
     const std::size_t digit = stem.find_first_of("0123456789", begin);
-    return digit == std::string::npos || stem.find_first_of("#@%", begin) != std::string::npos;
+    return digit == std::string::npos || stem.find_first_of("#@%$", begin) != std::string::npos;
 }
 
 std::string name_of(const std::string& media) {

@@ -207,7 +207,7 @@ class FramePicks:
         *,
         left: F32 | None = ...,
         display: tuple[float, float, Sequence[float]] | None = ...,
-        windows: Sequence[tuple[Sequence[float], float] | None] = ...,
+        windows: Sequence[tuple[Sequence[float], float, bool] | None] = ...,
         size: Sequence[float] = ...,
     ) -> None: ...
     def with_changes(self, changes: Sequence[Sequence[float]]) -> FramePicks:
@@ -217,7 +217,7 @@ class FramePicks:
     def of_part(self, part: tuple[float, float, float, float]) -> FramePicks:
         """The same picks of a part of the picture: left, top, right and bottom, in pixels."""
     @property
-    def windows(self) -> list[tuple[list[float], float] | None]: ...
+    def windows(self) -> list[tuple[list[float], float, bool] | None]: ...
     @property
     def count(self) -> int: ...
     @property

@@ -395,6 +395,12 @@ def test_a_window_is_set_listed_changed_and_removed(path: str, run: Run) -> None
     assert "window 13,3,23,13 at frame 2, 12,3,23,13 at frame 4; feather 3" in out
     assert re.search(r"takes \d+(\.\d)? % of frame 2", out)
     assert "feather 2.5" in run("window", "p1", "--feather", "2.5")[1]
+    assert "outside of window 13,3,23,13" in run("window", "p1", "--invert")[1]
+    assert picks_of(path)[0]["window"]["inverted"] is True
+    assert "outside of window" in run("picks")[1]
+    assert "outside of" in run("window", "p1", "--frame", "4", "--box", "12,3,23,12")[1]  # it stays
+    assert run("window", "p1", "--invert", "--none")[0] == 1
+    assert "outside of" not in run("window", "p1", "--no-invert")[1]
     assert "at frame 4" not in run("window", "p1", "--frame", "4", "--none")[1]
     assert run("window", "p1", "--frame", "4", "--none")[0] == 1
     assert run("window", "p1", "--none")[0] == 0
@@ -409,9 +415,12 @@ def test_a_pick_may_have_its_window_at_once(
 ) -> None:
     status, out, _ = run("pick", *BARN, "--window", "-9,3,23,13", "--feather", "2")
     assert status == 0
-    assert "window -9,3,23,13 at frame 2; feather 2" in out
+    assert "  window -9,3,23,13 at frame 2; feather 2" in out
     assert main.main(["info", path]) == 0
     assert "1 pick (1 window)" in capsys.readouterr().out
+    out = run("pick", *BARN, "--window", "-9,3,23,13", "--invert")[1]
+    assert "  outside of window -9,3,23,13" in out
+    assert run("pick", *BARN, "--invert")[0] == 1
 
 
 def test_a_window_that_is_lost_or_cannot_follow_says_so(

@@ -355,3 +355,36 @@ def test_a_pick_is_learned_without_a_bad_frame(tmp_path: Path, broken: bool) -> 
     red = np.array([[[201, 41, 41]]], np.float32) / 255
     moved = document.recolour(red, 2)[0, 0]
     assert moved == pytest.approx(np.array([0x30, 0x60, 0xB0]) / 255, abs=0.03)
+
+
+@pytest.mark.parametrize("fault", ["gone", "broken", "transparent"])
+def test_a_new_version_without_a_picks_place_keeps_the_pick(
+    tmp_path: Path, fault: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is picked where its colour is, in the nearest frame that shows it."""
+    halves = np.where(np.arange(24)[None, :, None] < 12, [200, 40, 40], [90, 90, 95]).repeat(16, 0)
+    alpha = np.full((16, 24, 1), 255)
+    for version in ("v1", "v2"):
+        for frame in range(1, 9):
+            pixels = np.concatenate([halves + frame, alpha], 2).astype(np.uint8)
+            if (version, fault, frame) == ("v2", "transparent", 5):
+                pixels[2:14, 2:8] = 0
+            write_image(tmp_path / version / f"g.{frame:04d}.png", pixels)
+    out = tmp_path / "g.p4d.json"
+    analyze = ["-o", str(out), "--quiet"]
+    assert main.main(["analyze", str(tmp_path / "v1"), *analyze, "--method", "static"]) == 0
+    pick = ["pick", "--pixel", "5,8", "--to", "#3060b0", "--frame", "5"]
+    assert main.main(["edit", str(out), *pick]) == 0
+    bad = tmp_path / "v2" / "g.0005.png"
+    if fault == "gone":
+        bad.unlink()
+    elif fault == "broken":
+        bad.write_bytes(b"no picture")
+    again = ["analyze", str(tmp_path / "v2"), *analyze, "--skip-bad-frames", "--keep-edits"]
+    assert main.main(again) == 0
+    assert "p1" in capsys.readouterr().err
+    (kept,) = Document.load(out).grade.picks
+    assert kept.frame == (5 if fault == "transparent" else 4)
+    red = np.array([[[201, 41, 41]]], np.float32) / 255
+    moved = Document.load(out).recolour(red, 2)[0, 0]
+    assert moved == pytest.approx(np.array([0x30, 0x60, 0xB0]) / 255, abs=0.03)

@@ -14,7 +14,7 @@ from palette4d.grade import copying, reanalysis, sidecar
 from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.copying import Fit
 from palette4d.grade.document import Document
-from palette4d.grade.picks import Pick
+from palette4d.grade.picks import Area, Pick
 from palette4d.media.array_clip import ArrayClip
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "sidecars"
@@ -307,10 +307,13 @@ def test_the_grade_is_copied_beyond_a_stop_and_to_another_encoding(
     assert (tmp_path / "clip.former.p4d.json").exists()
 
 
-def test_edits_between_analysed_frames_are_copied() -> None:
+@pytest.mark.parametrize("ramp", [None, "smooth", "step"])
+def test_edits_between_analysed_frames_are_copied(ramp: str | None) -> None:
     """A palette of each fifth frame gets what a palette of every frame has in between."""
     source = Document(members("split"))
-    source.adjust("v1", track=True, by=(0.3, 0.2, 0), start=6, until=8)
+    if ramp:
+        source.set_ramp(ramp)
+    source.adjust("v1", track=True, by=(0.3, 0.2, 0), start=6, until=8, fade=4)
     when = {"start": 6, "until": 8, "follow": False}
     source.pick(frame=7, colour=(0.5, 0.5, 0.5), by=(0.2, 0, 0), **when)
     sparse = members("split")
@@ -321,6 +324,24 @@ def test_edits_between_analysed_frames_are_copied() -> None:
         (pick,) = target.grade.picks
         assert (pick.start, pick.until) == (6, 8)
         assert worst(target, source, [(t, t) for t in range(21)]) < 4 / 255
+
+
+def test_marks_and_windows_go_along_with_frame_numbers(tmp_path: Path) -> None:
+    """The same pictures under other numbers are a new version of the clip."""
+    path = tmp_path / "clip.p4d.json"
+    former = Document(members("split"))
+    seen = former.grade.palette(8).rgb.mean(axis=0).tolist()
+    marked = {"areas": (Area(12, ((3, 4),), 2),), "window": (1, 2, 9, 8)}
+    former.pick(8, colour=seen, by=(0.2, 0, 0), follow=False, **marked)
+    former.set_window("p1", 15, (2, 2, 10, 8), follow=False)
+    former.save(path)
+    fields = stretched(members("split"), 1, 1000)
+    fields["polytope"]["vertices"][0]["rgb"][0] += 0.01
+    reanalysis.save(fields, path, on_edits="keep")
+    (pick,) = Document.load(path).grade.picks
+    assert (pick.frame, [area.frame for area in pick.areas]) == (1008, [1012])
+    assert pick.window is not None
+    assert [key.frame for key in pick.window.keys] == [1008, 1015]
 
 
 @pytest.mark.parametrize(

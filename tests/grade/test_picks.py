@@ -304,6 +304,24 @@ def test_the_feather_changes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "feather 8.5" in document.history.done[-1].label
 
 
+def test_an_inverted_window_leaves_out_what_is_in_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = moving(monkeypatch)
+    document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
+    image = np.full((60, 120, 3), document.grade.pick("p1").rgb, np.float32)
+    assert (document.recolour(image, 0) != image).all(2).all()
+    document.set_window("p1", 0, (20, 16, 30, 44), feather=0, follow=False, inverted=True)
+    changed = (document.recolour(image, 0, clean_up=0) != image).any(2)
+    assert not changed[16:44, 20:30].any()
+    changed[15:45, 19:31] = True  # the edge is as soft as a pixel
+    assert changed.all()
+    both = document.grade.pick("p1").window
+    assert both is not None
+    assert document.set_window("p1", 0, (20, 16, 31, 44), follow=False).window != both
+    assert "outside of window" in document.history.done[-1].label
+    again = document.grade.pick("p1")
+    assert Pick.from_fields(again.to_fields()).window == again.window == again.scaled(1, 1).window
+
+
 def test_windows_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     document = moving(monkeypatch)
     document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
@@ -330,6 +348,10 @@ def test_windows_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     document.undo()
     with pytest.raises(Palette4dError, match="without window"):
         document.pick(0, pixel=(20, 30), box=9, to="#2040c0", feather=3)
+    with pytest.raises(Palette4dError, match="without window"):
+        document.pick(0, pixel=(20, 30), box=9, to="#2040c0", inverted=True)
+    with pytest.raises(Palette4dError, match="p1 has no window, so that it has no inverted"):
+        document.change_pick("p1", inverted=True)
     with pytest.raises(Palette4dError, match="no window"):
         document.change_pick("p2", window=Window(0, (WindowKey(0, BOX, True),)))
     assert document.grade.state == state

@@ -241,6 +241,9 @@ TEST(a_still_stands_for_its_sequence) {
         {"/a/shot.-0003.exr", "/a/shot.####.exr"},
         {"/a/shot.1001-1100#.exr", "/a/shot.1001-1100#.exr"},
         {"/a/world0001.exr", "/a/world####.exr"},
+        {"/a/sh_010-1001.exr", "/a/sh_010-####.exr"},
+        {"/a/sh_010-####.exr", "/a/sh_010-####.exr"},
+        {"/a/shot.$F4.exr", "/a/shot.$F4.exr"},
         {"/a/v2/plate.exr", "/a/v2/plate.exr"},
         {"/a/take3.mov", "/a/take3.mov"},
     };
@@ -248,6 +251,8 @@ TEST(a_still_stands_for_its_sequence) {
         EXPECT(preferred(clip_spec(media)) == preferred(spec), clip_spec(media));
     }
     CHECK(preferred(sidecar_beside("/a/shot.####.exr")) == preferred("/a/shot.p4d.json"));
+    CHECK(preferred(sidecar_beside(clip_spec("/a/sh_010-1001.exr"))) ==
+          preferred("/a/sh_010.p4d.json"));
     CHECK(preferred(sidecar_beside("/a/take3.mov")) == preferred("/a/take3.p4d.json"));
     CHECK(preferred(sidecar_beside("/a/A001C001.mov")) == preferred("/a/A001C001.p4d.json"));
     CHECK(preferred(sidecar_beside("/a/plate_v2.png")) == preferred("/a/plate_v2.p4d.json"));

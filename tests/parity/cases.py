@@ -98,6 +98,11 @@ def window(feather: float, *keys: tuple[float, tuple[float, ...]]) -> dict[str, 
     return {"feather": feather, "keys": boxes}
 
 
+def outside(feather: float, *keys: tuple[float, tuple[float, ...]]) -> dict[str, Any]:
+    """All but a window."""
+    return {**window(feather, *keys), "inverted": True}
+
+
 def hold(name: str, rgb: Colour, **more: Any) -> dict[str, Any]:
     """A hold of a colour."""
     return {**pick(name, rgb, rgb, **more), "kind": "hold"}
@@ -321,6 +326,12 @@ def picked_documents() -> dict[str, Document]:
             [{**red, "window": window(0, (0, (20.5, 0, 64, 18)))},
              {**moving, "window": window(30, (0, (9, 9, 10, 10)), (20, (40, 20, 60, 30)))},
              {**green, "window": window(4, (0, (-50, -20, 33, 90)))}, pale],
+        ),
+        # All but a box that moves, beside one in that box.
+        "changes-outside": picked(
+            edited(changes, {"d1": (0.3, 0.0, 0.7)}, []),
+            [{**red, "window": outside(30, (0, (5, 8, 30, 20)), (20, (30, 10, 55, 22)))},
+             {**green, "window": window(4, (0, (10, 8, 33, 30)))}, moving],
         ),
         "colour-curve": picked(colour, [red, fading], None, (-0.25, 1.5, log)),
         "changes-picks": picked(

@@ -230,7 +230,8 @@ class Picked:
     change: F64
     strength: float
     matte: F32
-    window: tuple[F64, float] | None = None  # left, top, right, bottom; the feather
+    # left, top, right, bottom; the feather; whether it is inverted
+    window: tuple[F64, float, bool] | None = None
 
 
 @dataclass(frozen=True)
@@ -445,23 +446,25 @@ def picks_at(document: Document, frame: float) -> Picks:
     return Picks(found, left, curve, document["clip"]["size"])
 
 
-def window_of(pick: Document, frame: float) -> tuple[F64, float] | None:
+def window_of(pick: Document, frame: float) -> tuple[F64, float, bool] | None:
     """A pick's window at a frame."""
     if "window" not in pick:
         return None
     keys = pick["window"]["keys"]
     boxes = np.array([key["box"] for key in keys], float)
     times = [key["frame"] for key in keys]
-    return np.array([np.interp(frame, times, side) for side in boxes.T]), pick["window"]["feather"]
+    box = np.array([np.interp(frame, times, side) for side in boxes.T])
+    return box, pick["window"]["feather"], pick["window"].get("inverted", False)
 
 
-def in_window(window: tuple[F64, float] | None, x: float, y: float) -> float:
-    """What a window leaves of a pick at a place: 1 in the box, 0 from the feather on."""
+def in_window(window: tuple[F64, float, bool] | None, x: float, y: float) -> float:
+    """What a window leaves of a pick at a place: 1 in the box, 0 beyond the feather, or 1 - it."""
     if window is None:
         return 1
-    (left, top, right, bottom), feather = window
+    (left, top, right, bottom), feather, inverted = window
     away = np.hypot(max(left - x, x - right, 0), max(top - y, y - bottom, 0))
-    return float((1 - min(away / max(feather, 1), 1) ** 2) ** 2)
+    left_of_it = float((1 - min(away / max(feather, 1), 1) ** 2) ** 2)
+    return 1 - left_of_it if inverted else left_of_it
 
 
 # Weights -----------------------------------------------------------------------------------------

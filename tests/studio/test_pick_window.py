@@ -88,6 +88,25 @@ def test_it_is_switched_on_around_the_place_and_off(rows: WindowRows) -> None:
     assert box_of(rows) == [left, top, right, bottom]
 
 
+def test_it_is_inverted_and_stays_so_when_it_is_moved(rows: WindowRows) -> None:
+    assert not rows.invert.isVisibleTo(rows.on.window())
+    switch(rows)
+    assert not rows.invert.isChecked()
+    QTest.mouseClick(rows.invert, LEFT, pos=QPoint(6, rows.invert.height() // 2))
+    own = window_of(rows)
+    assert own is not None
+    assert own.inverted
+    rows.numbers["x"].setValue(rows.numbers["x"].value() + 3)
+    rows._keep()
+    moved = window_of(rows)
+    assert moved is not None
+    assert moved.inverted
+    assert moved.given != own.given
+    rows.session.undo()
+    rows.session.undo()
+    assert not rows.invert.isChecked()
+
+
 def test_it_begins_with_room_around_what_was_marked(rows: WindowRows) -> None:
     rows.session.edit(lambda d: d.change_pick("p1", areas=(Area(FRAME, ((40, 30), (100, 50)), 5),)))
     switch(rows)

@@ -35,7 +35,7 @@ PickWindow::Box PickWindow::box_at(double at) const {
 }
 
 FrameWindow::FrameWindow(const PickWindow& window, double frame)
-    : feather(std::max(window.feather, kLeastFeather)) {
+    : feather(std::max(window.feather, kLeastFeather)), inverted(window.inverted) {
     const PickWindow::Box exact = window.box_at(frame);
     for (std::size_t i = 0; i < box.size(); ++i) box[i] = static_cast<float>(exact[i]);
 }
@@ -46,7 +46,7 @@ double FrameWindow::at(const Spot& spot) const {
     };
     const double x = beyond(box[0], spot.x, box[2]), y = beyond(box[1], spot.y, box[3]);
     const double left = 1 - std::min((x * x + y * y) / (feather * feather), 1.0);
-    return left * left;
+    return inverted ? 1 - left * left : left * left;
 }
 
 const Matte& HueMatte::get() const {

@@ -33,7 +33,8 @@ private:
     mutable Matte matte_;
 };
 
-/// The part of the picture that a pick changes: a box that moves over time, and its soft surround.
+/// The part of the picture that a pick changes: a box that moves over time, and its soft surround;
+/// or all but that.
 struct PickWindow {
     /// Left, top, right and bottom, in pixels of the clip from its top left corner.
     using Box = std::array<double, 4>;
@@ -43,6 +44,7 @@ struct PickWindow {
     };
     double feather;         ///< how far the change fades out beyond the box, in pixels
     std::vector<Key> keys;  ///< at least one, in order; linear between
+    bool inverted = false;  ///< the pick changes what is outside
 
     Box box_at(double frame) const;
 };
@@ -59,8 +61,9 @@ struct FrameWindow {
 
     std::array<float, 4> box;
     double feather;
+    bool inverted;
 
-    /// What it leaves of a pick: 1 in the box, 0 from the feather on.
+    /// What it leaves of a pick: 1 in the box, 0 from the feather on; 1 minus that if inverted.
     double at(const Spot& spot) const;
 };
 /// The least feather in pixels: narrower edges have steps.

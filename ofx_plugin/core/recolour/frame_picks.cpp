@@ -328,9 +328,11 @@ std::shared_ptr<const FrameMatte> arranged(const std::shared_ptr<const FrameMatt
 template <class T>
 typename PickPlan<T>::Window plan_of(const std::optional<FrameWindow>& window) {
     constexpr T kFar = T(1e15);
-    if (!window) return {{-kFar, -kFar}, {kFar, kFar}, 1};
+    if (!window) return {{-kFar, -kFar}, {kFar, kFar}, 1, 0, 1};
     const auto& box = window->box;
-    return {{box[0], box[1]}, {box[2], box[3]}, static_cast<T>(1 / window->feather)};
+    const T scale = static_cast<T>(1 / window->feather);
+    const T outside = window->inverted ? T(1) : T(0);
+    return {{box[0], box[1]}, {box[2], box[3]}, scale, outside, 1 - 2 * outside};
 }
 
 }  // namespace

@@ -212,7 +212,7 @@ PALETTE4D_INLINE Lanes<T> window_at(const typename PickPlan<T>::Window& window,
         away = away + beyond * beyond;
     }
     const Lanes<T> left = all(T(1)) - min(away, all(T(1)));
-    return left * left;
+    return all(window.outside) + all(window.inside) * (left * left);
 }
 
 /// Adds to `sum` what a pick does to the colours from `at` on. Where several picks share a colour,

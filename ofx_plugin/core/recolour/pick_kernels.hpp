@@ -23,6 +23,7 @@ struct PickPlan {
     struct Window {
         T low[2], high[2];  ///< of a box, in pixels of the clip
         T scale;            ///< 1 / the feather
+        T outside, inside;  ///< 0 and 1, or 1 and -1: what is far away, and what the box adds
     };
     struct One {
         Grid matte;

@@ -55,6 +55,30 @@ bool is_unsafe(std::uint32_t c) {
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
+/// Whether a text is a range of frames, as some programs write it before a mark: "1001-1100",
+/// "-3-10x2,15". A number alone may belong to the name: "sh_010####".
+bool is_range(const std::string& text) {
+    std::size_t at = 0;
+    bool several = false;
+    const auto number = [&] {
+        const std::size_t begin = at;
+        while (at < text.size() && text[at] >= '0' && text[at] <= '9') ++at;
+        return at > begin;
+    };
+    const auto skip = [&](char c) { return at < text.size() && text[at] == c && ++at > 0; };
+    do {
+        skip('-');
+        if (!number()) return false;
+        if (skip('-')) {
+            several = true;
+            skip('-');
+            if (!number() || (skip('x') && !number())) return false;
+        }
+        several |= at < text.size();
+    } while (skip(','));
+    return several && at == text.size();
+}
+
 }  // namespace
 
 bool is_still(const std::string& file_name) {
@@ -81,6 +105,7 @@ std::size_t number_start(const std::string& stem) {
     };
     std::size_t begin = run(digits, end);
     if (begin < end) {
+        if (begin > 1 && stem.compare(begin - 2, 2, "$F") == 0) return begin - 2;
         if (begin > 0 && lower(stem[begin - 1]) == 'v' &&
             (begin == 1 || is_one_of("._- ", begin - 2))) {
             return std::string::npos;
@@ -94,10 +119,15 @@ std::size_t number_start(const std::string& stem) {
     } else if (end > 0 && is_one_of("#@", end - 1)) {
         begin = run(stem[end - 1] == '#' ? "#" : "@", end);
         const std::size_t range = run("0123456789-x,", begin);
-        if (range == 0 || is_one_of("._ ", range - 1)) begin = range;
+        if ((range == 0 || is_one_of("._ ", range - 1)) &&
+            is_range(stem.substr(range, begin - range))) {
+            begin = range;
+        }
     } else if (end > 0 && stem[end - 1] == 'd') {
         const std::size_t width = run(digits, end - 1);
         if (width > 0 && stem[width - 1] == '%') begin = width - 1;
+    } else if (end > 1 && stem.compare(end - 2, 2, "$F") == 0) {
+        return end - 2;
     }
     if (begin == end) return std::string::npos;
     const bool is_signed =

@@ -29,6 +29,7 @@ struct Counts {
 
 PickWindow read_window(const Cursor& where, Counts& counts) {
     PickWindow window{where.member("feather").number(), {}};
+    window.inverted = where.json().value("inverted", false);
     const Cursor keys = where.member("keys");
     keys.limit(counts.keys += keys.size(), kMaxPathKeys, "colours and boxes over time in all");
     std::optional<double> previous;

@@ -81,8 +81,9 @@ def add_actions(action: Action) -> None:
         "--window", type=_box_of_window, metavar="L,T,R,B", help="as --box of the action `window`"
     )
     pick.add_argument("--feather", type=number(0, 1e6), metavar="N", help="of the window")
+    _add_invert(pick)
     nothing = ("to", "by", "toward", "whole_hue", "reach", "softness", "lightness", "window")
-    hold.set_defaults(**dict.fromkeys((*nothing, "feather")))
+    hold.set_defaults(**dict.fromkeys((*nothing, "feather", "inverted")))
     _add_change(action)
     for name, text in (
         ("enable", "switch picks and holds on again."),
@@ -221,10 +222,11 @@ def _add_change(action: Action) -> None:
 def _add_window(action: Action) -> None:
     parser = action(
         "window",
-        "ID ([--frame T] --none | [--frame T --box L,T,R,B] [--feather N]) [--no-follow]",
-        "limit a pick to a box, beyond which the change fades out. The box moves with what is in "
-        "it; more boxes at other frames correct it. Where it is lost it stays. --feather alone "
-        "changes the feather of all frames.",
+        "ID ([--frame T] --none | [--frame T --box L,T,R,B] [--feather N] [--invert]) "
+        "[--no-follow]",
+        "limit a pick to a box, beyond which the change fades out, or with --invert to all but the "
+        "box. The box moves with what is in it; more boxes at other frames correct it. Where it is "
+        "lost it stays. --feather and --invert alone count for all frames.",
     )
     add = parser.add_argument
     add("id", metavar="ID", help="p1, p2, …")
@@ -249,6 +251,7 @@ def _add_window(action: Action) -> None:
         help="pixels beyond the box over which the change fades out; 0: a hard edge (default of a "
         "new window: a tenth of the box's shorter side)",
     )
+    _add_invert(parser)
     add(
         "--follow",
         action=argparse.BooleanOptionalAction,
@@ -257,6 +260,15 @@ def _add_window(action: Action) -> None:
     )
     add("--clip", metavar="CLIP", help="the clip (default: the sidecar's, if it is there)")
     parser.set_defaults(run=run_window)
+
+
+def _add_invert(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--invert",
+        dest="inverted",
+        action=argparse.BooleanOptionalAction,
+        help="the pick changes what is outside of the window",
+    )
 
 
 def _pixel(text: str) -> tuple[float, float]:
@@ -313,22 +325,26 @@ def run_window(args: argparse.Namespace) -> int:
     """Set, change or remove the window of a pick."""
     if args.frame is None and args.box is not None:
         raise Palette4dError("found --box without --frame, expected the frame of the box")
-    if args.frame is None and args.feather is None and not args.none:
-        raise Palette4dError("found nothing to change, expected --frame with --box, or --feather")
+    shape = {name: getattr(args, name) for name in ("feather", "inverted")}
+    if args.frame is None and shape == dict.fromkeys(shape) and not args.none:
+        raise Palette4dError(
+            "found nothing to change, expected --frame with --box, --feather or --invert"
+        )
     if args.frame is not None and args.box is None and not args.none:
         raise Palette4dError("found --frame without --box, expected both")
-    if args.none and args.feather is not None:
-        raise Palette4dError("found --none with --feather, expected one of them")
+    if args.none and (other := [name for name in shape if shape[name] is not None]):
+        option = {"feather": "--feather", "inverted": "--invert"}[other[0]]
+        raise Palette4dError(f"found --none with {option}, expected one of them")
     document = load(args.sidecar)
     with frames_bar("following", hidden=False) as progress:
         if args.box is None and not args.none:
-            document.change_pick(args.id, feather=args.feather, clip=args.clip)
+            document.change_pick(args.id, **shape, clip=args.clip)
         else:
             document.set_window(
                 args.id,
                 args.frame,
                 args.box,
-                feather=args.feather,
+                **shape,
                 follow=args.follow,
                 clip=args.clip,
                 progress=progress,
@@ -348,7 +364,7 @@ def run_pick(args: argparse.Namespace) -> int:
         "clip": args.clip,
         "any_value": args.any_value,
     }
-    names = (*_RANGE, *_MATTE, "toward", "follow", "window", "feather")
+    names = (*_RANGE, *_MATTE, "toward", "follow", "window", "feather", "inverted")
     how = {name: getattr(args, name) for name in names}
     given = {name: value for name, value in how.items() if value is not None}
     with frames_bar("following", hidden=False) as progress:
@@ -544,7 +560,8 @@ def _window(document: Document, pick: Pick, followed: bool) -> list[str]:
     given = window.given.keys
     boxes = [f"{','.join(f'{side:g}' for side in k.box)} at frame {k.frame:g}" for k in given[:3]]
     more = f" and {len(given) - 3} more" if len(given) > 3 else ""
-    lines = [f"  window {', '.join(boxes)}{more}; feather {window.feather:g}"]
+    outside = "outside of " if window.inverted else ""
+    lines = [f"  {outside}window {', '.join(boxes)}{more}; feather {window.feather:g}"]
     if all(key.given for key in window.keys):
         low, high = pick.span(document.grade.frames)
         clip = document.grade.core.clip

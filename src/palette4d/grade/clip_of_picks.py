@@ -21,7 +21,7 @@ from palette4d.grade.follow import Progress
 from palette4d.grade.grade import Grade
 from palette4d.grade.mattes import Display, Learned, learn, most_frames
 from palette4d.grade.picks import ALIKE, PathKey, Pick, Window
-from palette4d.media.clip_base import describe
+from palette4d.media.clip_base import FrameError, describe
 from palette4d.media.proxy_clip import ProxyClip, is_proxy
 from palette4d.media.source_clip import find_clip, nearest_frame
 
@@ -202,14 +202,13 @@ class ClipOfPicks:
     def at_home(self, pick: Pick, display: Display | None) -> Pick | None:
         """Return a pick of another clip at the largest region here that has nearly its colour.
 
-        None if no connected region of `LEAST_REGION` has it.
+        None if no connected region of `LEAST_REGION` has it in the nearest frame that can be read.
         """
         from scipy import ndimage
 
         clip = self.open()
         assert clip is not None
-        frame = nearest_frame(clip, pick.frame)
-        pixels = self.read(frame)
+        frame, pixels = self._near(pick.frame)
         real = np.asarray(np.isfinite(pixels).all(axis=2))
         colours = np.where(real[..., None], pixels, 0).reshape(-1, 3)
         off = _core.pick_points(colours, display) - _core.pick_points([pick.rgb], display)
@@ -222,6 +221,17 @@ class ClipOfPicks:
             return None
         rgb = self.colour(frame, place, box)
         return replace(pick, frame=frame, rgb=rgb, pixel=place, box=box)
+
+    def _near(self, frame: float) -> tuple[int, F32]:
+        """Return the nearest frame of the clip that can be read, and its colours."""
+        clip = self.open()
+        assert clip is not None
+        for near in sorted(clip.frames, key=lambda number: abs(number - frame)):
+            try:
+                return near, self.read(near)
+            except FrameError as error:
+                bad = error
+        raise bad
 
     def warnings(self, pick: Pick, stored: Sequence[NDArray[np.float64]]) -> tuple[str, ...]:
         """Return what speaks against a pick's clip and its colour.

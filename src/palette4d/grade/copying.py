@@ -5,6 +5,8 @@ corresponding time. Stops are added where the change along an edge is not linear
 again from the target's clip: there their colour is, connected, or they are not copied.
 """
 
+import itertools
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -42,6 +44,8 @@ NEAR = 0.05
 #: Largest differences of a copy that fits, as shares of the grade's mean change: the second
 #: while the difference is below a step of 8 bits. A tenth of such a step is rounding.
 FITS, FITS_BELOW_A_STEP, ROUNDING = 0.3, 0.5, 0.1 / 255
+#: Times between two handles at which a smooth ramp is looked at.
+ON_SMOOTH = 7
 
 
 @dataclass(frozen=True)
@@ -107,7 +111,7 @@ class Fit:
         """What of the picks is not as it was, for people; "" if nothing."""
         text = ""
         if self.elsewhere:
-            why = "their place has another colour here"
+            why = "their place has another colour here, or none"
             text += f"; picked where their colour is, since {why}: {', '.join(self.elsewhere)}"
         if self.left_out:
             why = "nothing connected has the colour here"
@@ -158,16 +162,24 @@ class Match:
 
     @property
     def knots(self) -> list[float]:
-        """The target's times of the source's vertices and stops: between them it goes along lines.
+        """The target's times that show all of the source's ramps.
 
-        They may lie between frames that were analysed.
+        They may lie between frames that were analysed: those of vertices and stops, between which
+        the source goes along lines; the last frame before each, where a step ends; and some on
+        smooth ramps.
         """
         if not isinstance(self.time, str):
             return []
         stops = [stop.frame for stop in self.source.settings.values() if stop.frame is not None]
         own = {vertex["frame"] for vertex in self.source.members["polytope"]["vertices"]}
+        times = sorted(map(self.back, own.union(stops)))
+        frames = [float(math.ceil(time)) for time in times]
+        smooth = {self.source.ramp, *(set_.ramp for set_ in self.source.settings.values())}
+        between = [np.linspace(*pair, ON_SMOOTH + 2) for pair in itertools.pairwise(times)]
+        curved = np.concatenate([[], *between]).tolist() if "smooth" in smooth else []
         first, last, _ = self.target.frames
-        return [frame for frame in map(self.back, own.union(stops)) if first <= frame <= last]
+        wanted = {*times, *frames, *(frame - 1 for frame in frames), *curved}
+        return [time for time in wanted if first <= time <= last]
 
     @property
     def pace(self) -> float:
@@ -353,10 +365,18 @@ def _pick(match: Match, pick: Pick, frames: Sequence[int], *, same_clip: bool) -
             copy = replace(copy, rgb=colour(pick.rgb))
         else:  # it was picked at a frame that is not in the target
             copy = replace(picked_at(match.there(frame)), pixel=None, box=None)
+        inside = [area for area in copy.areas if first <= match.back(area.frame) <= last]
+        window = copy.window
+        if window is not None:
+            boxes = {round(match.back(key.frame)): key for key in window.keys}
+            window = replace(
+                window, keys=tuple(replace(boxes[f], frame=float(f)) for f in sorted(boxes))
+            )
         return replace(
             copy,
             frame=frame,
-            areas=tuple(area for area in copy.areas if first <= area.frame <= last),
+            areas=tuple(replace(area, frame=time(area.frame)) for area in inside),
+            window=window,
             start=end(pick.start),
             until=end(pick.until),
             fade=pick.fade * match.pace,

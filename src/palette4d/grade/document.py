@@ -366,6 +366,7 @@ class Document:
         box: Iterable[float] | None,
         *,
         feather: float | None = None,
+        inverted: bool | None = None,
         follow: bool = True,
         clip: OfClip | None = None,
         progress: Progress | None = None,
@@ -390,6 +391,9 @@ class Document:
         feather : float, optional
             In pixels; 0 is a hard edge. By default it stays; that of a new window is a tenth of the
             box's shorter side. `change_pick(id, feather=…)` changes it alone.
+        inverted : bool, optional
+            The pick changes what is outside of the box instead. By default it stays;
+            `change_pick(id, inverted=…)` changes it alone.
         follow : bool
             Follow the box through the clip. Without this, or without the clip, it is linear between
             the given boxes.
@@ -397,7 +401,8 @@ class Document:
             As in `pick`.
         """
         own = self._clip(clip)
-        how: dict[str, Any] = {"feather": feather, "follow": follow, "progress": progress}
+        how: dict[str, Any] = {"feather": feather, "inverted": inverted, "follow": follow}
+        how["progress"] = progress
         self._take(pick_edits.set_window(self.grade, own, id, frame, box, **how))
         return self.grade.pick(id)
 
@@ -407,8 +412,8 @@ class Document:
         `by` gives the new colour as offsets from the picked colour. A new `frame` or `rgb` is
         followed again, if the pick was followed. In a new range the path and the window are
         followed again, unless they are known in all of it. `follow` begins or ends that. `feather`
-        is the window's. Where its place or a hold changes, mattes are learned again. `any_value`
-        and `progress` are those of `pick`.
+        and `inverted` are the window's. Where its place or a hold changes, mattes are learned
+        again. `any_value` and `progress` are those of `pick`.
         """
         self._take(pick_edits.change_pick(self.grade, self._clip(clip), id, **changes))
         return self.grade.pick(id)

@@ -4,6 +4,7 @@ Each function takes a grade and arguments, and returns the grade after the edit.
 what colours picks take, from a `ClipOfPicks`.
 """
 
+import contextlib
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, TypedDict, Unpack
@@ -79,6 +80,8 @@ class Asked(When, total=False):
     window, feather : 4 floats, and float
         The box at `frame` that the pick changes, and how far beyond it the change fades out
         (`Document.set_window`).
+    inverted : bool
+        The pick changes what is outside of the window.
     """
 
     to: Iterable[float] | str | None
@@ -90,6 +93,7 @@ class Asked(When, total=False):
     lightness: tuple[float, float]
     window: Iterable[float] | None
     feather: float | None
+    inverted: bool | None
 
 
 def pick(
@@ -115,12 +119,15 @@ def pick(
     names = ("toward", "whole_hue", "reach", "softness", "lightness")
     shape = {name: given[name] for name in names if name in given}
     made = replace(picked, kind="pick", to=new, **shape)
-    box, feather = asked.get("window"), asked.get("feather")
-    if box is None and feather is not None:
-        raise Palette4dError(f"found {Arg('feather')} without {Arg('window')}, expected both")
+    box, feather, inverted = asked.get("window"), asked.get("feather"), asked.get("inverted")
+    if box is None and (feather is not None or inverted is not None):
+        raise Palette4dError(
+            f"found {Arg('feather' if inverted is None else 'inverted')} without {Arg('window')}, "
+            "expected both"
+        )
     if box is not None:
         key = WindowKey(frame, as_box(box), given=True)
-        made = replace(made, window=_with_key(None, key, feather))
+        made = replace(made, window=_with_key(None, key, feather, inverted))
     return _add(grade, clip, made, asked, progress)
 
 
@@ -179,6 +186,7 @@ def set_window(
     box: Iterable[float] | None,
     *,
     feather: float | None = None,
+    inverted: bool | None = None,
     follow: bool = True,
     progress: Progress | None = None,
 ) -> Grade:
@@ -192,10 +200,9 @@ def set_window(
     if box is None and old.window is None:
         raise Palette4dError(f"{id} has no window; expected a box, to give it one")
     if box is None:
-        if feather is not None:
-            raise Palette4dError(
-                f"found {Arg('feather')} without a box of the window, expected both"
-            )
+        if feather is not None or inverted is not None:
+            shape = Arg("feather" if feather is not None else "inverted")
+            raise Palette4dError(f"found {shape} without a box of the window, expected both")
         new = replace(old, window=None if frame is None else _without_key(old, frame))
         text = _window_text(new) if new.window is None else f"no box at frame {frame:g}"
     else:
@@ -204,7 +211,7 @@ def set_window(
         grade.check_frame(frame)
         clip.check_places(frame, ())
         key = WindowKey(frame, as_box(box), given=True)
-        new = replace(old, window=_with_key(old.window, key, feather))
+        new = replace(old, window=_with_key(old.window, key, feather, inverted))
         text = _window_text(new, frame)
     new = checked(new, grade.frames)
     if follow:
@@ -226,15 +233,18 @@ def _without_key(pick: Pick, frame: float) -> Window | None:
     return replace(pick.window, keys=kept) if kept else None
 
 
-def _with_key(window: Window | None, key: WindowKey, feather: float | None) -> Window:
+def _with_key(
+    window: Window | None, key: WindowKey, feather: float | None, inverted: bool | None
+) -> Window:
     """Return a window's given keys with another one."""
-    if window is None:
-        left, top, right, bottom = key.box
-        width = round(FEATHER * min(right - left, bottom - top), 1) if feather is None else feather
-        return Window(float(width), (key,))
-    keys = {each.frame: each for each in window.keys if each.given} | {key.frame: key}
-    width = window.feather if feather is None else float(feather)
-    return Window(width, tuple(keys[at] for at in sorted(keys)))
+    left, top, right, bottom = key.box
+    before = window or Window(round(FEATHER * min(right - left, bottom - top), 1), ())
+    keys = {each.frame: each for each in before.keys if each.given} | {key.frame: key}
+    return Window(
+        before.feather if feather is None else float(feather),
+        tuple(keys[at] for at in sorted(keys)),
+        before.inverted if inverted is None else bool(inverted),
+    )
 
 
 def _window_followed(clip: ClipOfPicks, pick: Pick, progress: Progress | None) -> Pick:
@@ -256,14 +266,15 @@ def change_pick(
 ) -> Grade:
     """Change a pick or hold (`Document.change_pick`)."""
     old = grade.pick(id)
-    if (feather := changes.pop("feather", None)) is not None:
+    of_window = {name: changes.pop(name, None) for name in ("feather", "inverted")}
+    if of_window := {name: value for name, value in of_window.items() if value is not None}:
         window = changes.get("window", old.window)
         if window is None:
             raise Palette4dError(
-                f"{id} has no window, so that it has no feather; expected a box first: "
-                f"`window {id} --frame T --box L,T,R,B`"
+                f"{id} has no window, so that it has no {' and no '.join(of_window)}; expected a "
+                f"box first: `window {id} --frame T --box L,T,R,B`"
             )
-        changes["window"] = replace(window, feather=float(feather))
+        changes["window"] = replace(window, **of_window)
     if changes.get("pixel") is not None and "rgb" not in changes:
         frame, box = changes.get("frame", old.frame), changes.get("box") or 1
         grade.check_frame(frame)
@@ -332,9 +343,11 @@ def taken(
     for pick in picks:
         here: Pick | None = pick
         if there and pick.pixel is not None:
-            rgb = clip.colour(pick.frame, pick.pixel, pick.box or 1)
-            here = replace(pick, rgb=rgb)
-            if not clip.alike(rgb, pick.rgb):
+            rgb = None
+            with contextlib.suppress(Palette4dError):  # the place has no colour; a bad frame
+                rgb = clip.colour(pick.frame, pick.pixel, pick.box or 1)
+                here = replace(pick, rgb=rgb)
+            if rgb is None or not clip.alike(rgb, pick.rgb):
                 away.append(pick.id)
                 here = clip.at_home(replace(pick, areas=(), window=None), grade.display())
         elif there and not pick.whole_hue:
@@ -486,7 +499,8 @@ def _window_text(pick: Pick, frame: float | None = None) -> str:
     if frame is None:
         frame = next((key.frame for key in pick.window.keys if key.given), pick.frame)
     box = ",".join(f"{side:g}" for side in pick.window.box_at(frame))
-    return f"window {box} at frame {frame:g}, feather {pick.window.feather:g}"
+    outside = "outside of " if pick.window.inverted else ""
+    return f"{outside}window {box} at frame {frame:g}, feather {pick.window.feather:g}"
 
 
 def _with_one_fade(pick: Pick) -> Pick:

@@ -105,12 +105,13 @@ class WindowKey:
 class Window:
     """The part of the picture that a pick changes: a box that moves over time.
 
-    Beyond the box the change fades out over `feather` pixels. `keys` are in order of time; the box
-    is linear between them.
+    Beyond the box the change fades out over `feather` pixels; `inverted`, it fades in there, and
+    the box keeps its colours. `keys` are in order of time; the box is linear between them.
     """
 
     feather: float
     keys: tuple[WindowKey, ...]
+    inverted: bool = False
 
     def spans(self, width: int, height: int) -> bool:
         """Return whether a given box reaches across a picture of this size, beyond both sides."""
@@ -213,7 +214,7 @@ class Pick:
         path, areas = values.pop("path", ()), values.pop("areas", ())
         if window := values.pop("window", None):
             keys = (WindowKey(**{**key, "box": tuple(key["box"])}) for key in window["keys"])
-            values["window"] = Window(window["feather"], tuple(keys))
+            values["window"] = Window(**{**window, "keys": tuple(keys)})
         return cls(
             **values,
             path=tuple(PathKey(**{**key, "rgb": as_colour(key["rgb"])}) for key in path),
@@ -241,9 +242,10 @@ class Pick:
             return math.floor((point[0] + 0.5) * x), math.floor((point[1] + 0.5) * y)
 
         mean, change = math.sqrt(x * y), dataclasses.replace
-        window = self.window and Window(
-            self.window.feather * mean,
-            tuple(
+        window = self.window and change(
+            self.window,
+            feather=self.window.feather * mean,
+            keys=tuple(
                 change(key, box=as_box(np.multiply(key.box, (x, y, x, y))))
                 for key in self.window.keys
             ),

@@ -217,6 +217,12 @@ def feather_window(session: Session, id_: str, feather: float, *, dragging: bool
     do(lambda document: document.change_pick(id_, feather=feather), text)
 
 
+def invert_window(session: Session, id_: str, inverted: bool) -> None:
+    """Let a pick change what is outside of its window, or inside (`window`)."""
+    text = texts.INVERTED[inverted].format(id=id_)
+    session.edit(lambda document: document.change_pick(id_, inverted=inverted), text)
+
+
 def remove_window(session: Session, id_: str) -> None:
     """Let a pick change all of the picture again (`window`)."""
     text = texts.WINDOW_REMOVED.format(id=id_)

@@ -50,8 +50,12 @@ class WindowRows(QObject):
         self.on = QCheckBox(texts.WINDOW)
         self.on.setToolTip(texts.WINDOW_TIP)
         self.on.clicked.connect(self._switched)
+        self.invert = QCheckBox(texts.INVERT)
+        self.invert.setToolTip(texts.INVERT_TIP)
+        self.invert.clicked.connect(self._inverted)
         switches = QHBoxLayout()
         switches.addWidget(self.on)
+        switches.addWidget(self.invert)
         switches.addStretch(1)
         switches.addWidget(beside)
         grid.addLayout(switches, line, 0, 1, 3)
@@ -111,14 +115,15 @@ class WindowRows(QObject):
         boxes = [] if window is None else [key.frame for key in window.given.keys]
         self.remove.setText(texts.REMOVE_BOX.format(frame=self.session.frame))
         self.remove.setVisible(len(boxes) > 1 and self.session.frame in boxes)
-        parts = (*self._names, *self.numbers.values(), self.label, self.bar, self.feather)
-        for part in parts:
+        shape = (self.invert, self.label, self.bar, self.feather)
+        for part in (*self._names, *self.numbers.values(), *shape):
             part.setVisible(window is not None)
         self.on.setChecked(window is not None)
         if window is None:
             return
         for name, value in self._numbers_of(window).items():
             self.numbers[name].show_number(value)
+        self.invert.setChecked(window.inverted)
         self.feather.show_number(window.feather)
         self.bar.show_value(window.feather, 0.0, 0.0, self._most(), GREYS)
 
@@ -145,6 +150,11 @@ class WindowRows(QObject):
             )
         else:
             grade_steps.remove_window(self.session, pick.id)
+
+    def _inverted(self, on: bool) -> None:
+        pick = self.session.picked
+        if pick is not None and pick.window is not None:
+            grade_steps.invert_window(self.session, pick.id, on)
 
     def _remove_box(self) -> None:
         pick = self.session.picked

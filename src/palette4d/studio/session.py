@@ -489,13 +489,14 @@ class Session(Drafts):
             self._stamp = stamp
             self.say(f"{texts.BROKEN} {in_words(error)}", "error")
             return
-        former = None if self._document is None else self._document.grade.core.clip["source"]
+        former = None if self._document is None else self._document.grade.core.clip
         self._document, self._trial, self._dragged = loaded, None, None
         self._stamp, self._edited_at = stamp, None
         clip = loaded.grade.core.clip
-        if clip["source"] == former:
+        of_clip = ("source", "first", "last")
+        if former is not None and all(clip[name] == former[name] for name in of_clip):
             self._find_display()
-        else:  # an analysis of another clip, or one that was undone
+        else:  # an analysis of another clip or of more frames, or one that was undone
             self._set_clip(find_clip(self.path, clip, None))
         self.say(texts.RELOADED)
         self._changed()

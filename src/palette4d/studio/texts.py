@@ -581,6 +581,9 @@ WINDOW_NUMBERS = {
     "width": ("W", "The window's width in pixels"),
     "height": ("H", "The window's height in pixels"),
 }
+INVERT = "Invert"
+INVERT_TIP = "It changes all but what is in the window"
+INVERTED = ("{id} changes what is in its window", "{id} changes all but what is in its window")
 FEATHER = "Feather"
 FEATHER_TIP = "Over how many pixels the change fades out beyond the window"
 WINDOW_LOST = (
