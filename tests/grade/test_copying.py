@@ -351,9 +351,15 @@ def test_marks_and_windows_go_along_with_frame_numbers(tmp_path: Path) -> None:
 def test_clips_with_frame_numbers_in_common_keep_edits_at_them(
     first: int, last: int, time: str
 ) -> None:
-    own = {"source": "v2.mov", "frames": {"first": first, "last": last}}
+    own = {"source": "v1.mov", "frames": {"first": first, "last": last}}
     former = {"source": "v1.mov", "frames": {"first": 0, "last": 20}}
     assert reanalysis._time(own, former) == (time or "relative")
+
+
+def test_the_same_frames_need_frames_in_common() -> None:
+    target = Document(stretched(members("split"), 1, 100))
+    with pytest.raises(Palette4dError, match=r"100 to 120 here and 0 to 20 in .*in common"):
+        target.copy_from(graded(), time="same")
 
 
 def test_picks_are_copied() -> None:

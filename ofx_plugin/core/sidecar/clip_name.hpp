@@ -13,8 +13,9 @@ inline constexpr const char* kSidecarEnding = ".p4d.json";
 bool is_still(const std::string& file_name);
 
 /// Where the frame number at the end of a name without extension begins, or its mark: 1001, -0003,
-/// ####, @@@@, %04d, $F4, 1001-1100#, [1001-1100]; npos without one. A minus is a sign at the start and after another
-/// separator: "sh010-0010" is frame 10. The 2 of "plate_v2" is a version, not a frame.
+/// ####, @@@@, %04d, $F4, 1001-1100#, [1001-1100]; npos without one. A minus is a sign at the start
+/// and after another separator: "sh010-0010" is frame 10. The 2 of "plate_v2" is a version, not a
+/// frame.
 std::size_t number_start(const std::string& stem);
 
 /// A media file's name without its extension and, for an image, without its frame number:

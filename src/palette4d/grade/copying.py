@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from palette4d import _core
 from palette4d.colour.encoding_conversion import between
 from palette4d.common.arguments import frames_between
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Arg, Palette4dError
 from palette4d.common.files import same_file
 from palette4d.grade import recolouring
 from palette4d.grade.clip_colours import ClipColours
@@ -266,6 +266,12 @@ def _match(target: Grade, source: Grade, time: Time) -> Match:
         source.check_frame(time)
     elif time not in ("relative", "same"):
         raise Palette4dError(f"found the time {time!r}, expected 'relative', 'same' or a frame")
+    (first, last, _), (begin, end, _) = target.frames, source.frames
+    if time == "same" and not (first <= end and begin <= last):
+        raise Palette4dError(
+            f"found the frames {first} to {last} here and {begin} to {end} in {source.name}, "
+            f"expected frames in common; leave out {Arg('time', 'same')}"
+        )
     return Match(target, source, time)
 
 

@@ -102,11 +102,10 @@ def _time(own: Fields, other: Fields) -> Literal["relative", "same"]:
 
     Clips that have numbers in common have these frames in common.
     """
-    first, last, begin, end = (
-        clip["frames"][name] for clip in (own, other) for name in ("first", "last")
+    (first, last), (begin, end) = (
+        (clip["frames"]["first"], clip["frames"]["last"]) for clip in (own, other)
     )
-    overlap = first <= end and begin <= last
-    return "same" if own["source"] == other["source"] or overlap else "relative"
+    return "same" if first <= end and begin <= last else "relative"
 
 
 def _with_same_handles(old: Grade, new: Grade, by: tuple[float, float]) -> Grade | None:
