@@ -1,19 +1,20 @@
-"""A clip's picks and holds as constants: `clip_grids.inc` of the kernel reads them.
+"""A clip's picks and holds as constants: `clip_grids.inc` and `clip_table.inc` read them.
 
-A matte changes with the picked colour. Stored is each pick's matte where it was picked, without
-loss, and at some frames (keys) what it takes to make the matte of a frame from it.
+A matte changes with the picked colour. Stored is each pick's matte where it was picked, and what it
+takes to make the matte of a frame from it: a table, whose numbers have keys of their own where they
+change.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from palette4d.lut_export.clip_keys import F64, bends, keys_of
 
 from palette4d import _core
-
-F64 = NDArray[np.float64]
 
 #: `layout.inc` of the kernel: numbers of the head, where it says where picks are and which display
 #: curve, numbers of a pick, and where in it its plan, its strength and its shade begin; of a hold.
@@ -22,38 +23,51 @@ HEAD, PICKS, DISPLAY, PICK, PLAN, STRENGTH, SHADE, HOLD = 28, 14, 17, 33, 13, 21
 TOLERANCE = 4e-6
 
 
+Curve = tuple[int, float, float, list[float]]
+
+
 @dataclass(frozen=True)
 class PickConstants:
     """The constants.
 
-    At some frames (`times`) there is a table. Its number i is column columns[i] of `tables`, which
-    changes, or number -1 - columns[i] of `fixed`. `stills` are the grids, `values` theirs.
+    Number i of a frame's table is number columns[i] of those in `tracks`, which change, or number
+    -1 - columns[i] of `fixed`. `stills` are the grids, `books` their values after the display's.
     """
 
-    times: list[float]
-    tables: F64  #: (times, columns)
     columns: list[int]
     fixed: list[float]
-    stills: list[int]
+    moving: int  #: numbers that change
+    tracks: list[list[int]]  #: as `clip_table.inc` says; times are counted in `times`
+    times: list[float]
     values: list[float]
-    bits: int  #: of a code in the still grids
+    display: list[float]
+    stills: list[int]
+    books: list[float]
+    base: int  #: how many values a code of the still grids may have
 
     @property
     def table_size(self) -> int:
-        """Bytes without grids and values."""
-        return 4 * (len(self.times) + self.tables.size + len(self.columns) + len(self.fixed))
+        """Bytes without grids and their values."""
+        numbers = len(self.columns) + len(self.fixed) + len(self.times) + len(self.values)
+        return 4 * (numbers + 5 * len(self.tracks))
 
     @property
     def size(self) -> int:
         """Bytes."""
-        return self.table_size + 4 * (len(self.stills) + len(self.values))
+        return self.table_size + 4 * (len(self.stills) + len(self.books))
 
     @property
     def texture(self) -> NDArray[np.uint8]:
         """(h, 256, 4) bytes: grids, then values, each number as four bytes, the lowest first."""
         numbers = np.array(self.stills, np.int64).astype("<u4")
-        data = numbers.tobytes() + np.array(self.values, "<f4").tobytes()
+        data = numbers.tobytes() + np.array(self.books, "<f4").tobytes()
         return np.frombuffer(data + bytes(-len(data) % 1024), np.uint8).reshape(-1, 256, 4)
+
+    def with_mattes(self, edits: _core.Edits) -> "PickConstants":
+        """Return the same picks with these edits' mattes."""
+        mattes = edits.still_mattes()
+        stills, books, base = _stills([mattes[i][1:4] for i in _order(mattes)], self.display)
+        return replace(self, stills=stills, books=books, base=base)
 
 
 def pick_constants(
@@ -64,38 +78,71 @@ def pick_constants(
     `recolourers` are the edit at each of the times.
     """
     mattes = edits.still_mattes()
-    if not mattes:
-        return None
-    order = sorted(mattes, key=lambda number: mattes[number][0])  # holds last
-    stills, values, bits = _stills([mattes[number][1:4] for number in order])
     moments = [edits.pick_moments(time) for time in times]
     if not any(moments):
         return None
+    order = _order(mattes)
     rows = [_row(order, mattes, now, edit) for now, edit in zip(moments, recolourers, strict=True)]
     curve = next((curve for _, curve in rows if curve is not None), None)
     table = np.stack([row for row, _ in rows])
     _fill(table, sum(not mattes[number][0] for number in order), len(order))
+    display: list[float] = []
     if curve is not None:
-        count, start, scale, samples = curve
-        table[:, DISPLAY : DISPLAY + 4] = count, len(values), start, scale
-        values += samples
-    keys = _keys(np.asarray(times), table)
-    moving = np.ptp(table, axis=0) > 0
-    moving[0] |= not moving.any()  # no array is empty
+        count, start, scale, display = curve
+        table[:, DISPLAY : DISPLAY + 4] = count, 0, start, scale
     fixed, places = np.unique(table[0], return_inverse=True)
-    columns = np.where(moving, np.cumsum(moving) - 1, -1 - places)
-    return PickConstants(
-        [times[key] for key in keys],
-        table[np.ix_(keys, moving)],
-        columns.tolist(),
-        fixed.tolist(),
-        stills,
-        values,
-        bits,
-    )
+    columns, moving = -1 - places, 0
+    tracks: list[list[int]] = []
+    at: list[float] = []
+    values: list[float] = []
+    changes = np.ptp(table, axis=0) > 0
+    changes[0] |= not changes.any()  # no array is empty
+    spans = [(0, HEAD, True)]
+    for start, size in _parts(table, len(order)):
+        # The node goes in steps, all else along cubics.
+        spans += [(start, start + 3, True), (start + 3, start + size, False)]
+    for start, end, held in spans:
+        own = start + np.flatnonzero(changes[start:end])
+        if len(own) > 0:
+            keys, numbers = _track(np.asarray(times), table[:, own], held=held)
+            tracks.append([len(at), len(at) + len(keys) - 1, len(values), len(own), int(held)])
+            columns[own] = moving + np.arange(len(own))
+            moving += len(own)
+            at += [times[key] for key in keys]
+            values += numbers
+    kept = columns.tolist(), fixed.tolist(), moving, tracks, at, values, display
+    return PickConstants(*kept, [], [], 0).with_mattes(edits)
 
 
-Curve = tuple[int, float, float, list[float]]
+def _order(mattes: dict[int, Any]) -> list[int]:
+    """Return the picks, then the holds."""
+    return sorted(mattes, key=lambda number: mattes[number][0])
+
+
+def _parts(table: F64, count: int) -> list[tuple[int, int]]:
+    """Return where each pick and hold is in a table, and how many numbers it has."""
+    picks = int(table[0, PICKS])
+    left = HEAD + PICK * picks
+    holds = [(left + 1 + HOLD * i, HOLD) for i in range(count - picks)]
+    return [(HEAD + PICK * i, PICK) for i in range(picks)] + holds
+
+
+def _track(times: F64, part: F64, *, held: bool) -> tuple[list[int], list[float]]:
+    """Return the keys of these columns of the table, and their values."""
+    most = TOLERANCE * np.maximum(np.abs(part).max(axis=0), 1.0)
+
+    def fits(key: int, end: int) -> bool:
+        if held:
+            return bool((part[key:end] == part[key]).all())
+        return bool((bends(times[key : end + 1], part[key : end + 1])[1] <= most).all())
+
+    keys = keys_of(len(times), fits)
+    if held:
+        return keys, part[keys].ravel().tolist()
+    bent = np.zeros((len(keys), 2, part.shape[1]))
+    for i, (key, end) in enumerate(pairwise(keys)):
+        bent[i] = bends(times[key : end + 1], part[key : end + 1])[0]
+    return keys, np.concatenate([part[keys, None], bent], axis=1).swapaxes(1, 2).ravel().tolist()
 
 
 def _row(
@@ -154,48 +201,28 @@ def _node(point: Sequence[float]) -> list[float]:
 
 def _fill(table: F64, picks: int, count: int) -> None:
     """Give what asks for nothing the numbers of its nearest frame, without strength and change."""
-    for place in range(count):
-        is_pick = place < picks
-        start = HEAD + PICK * place if is_pick else HEAD + PICK * picks + 1 + HOLD * (place - picks)
-        part = table[:, start : start + (PICK if is_pick else HOLD)]
+    for place, (start, size) in enumerate(_parts(table, count)):
+        part = table[:, start : start + size]
         on = np.flatnonzero(~np.isnan(part).any(axis=1))
         if len(on) == 0:
             part[np.isnan(part)] = 0
             continue
         for frame in np.setdiff1d(np.arange(len(table)), on):
             part[frame] = part[on[np.argmin(np.abs(on - frame))]]
-            part[frame, slice(STRENGTH, SHADE) if is_pick else -1] = 0
-
-
-def _keys(times: F64, table: F64) -> list[int]:
-    """Return the fewest rows between which all others follow in straight lines."""
-    scale = TOLERANCE * np.maximum(np.abs(table).max(axis=0), 1.0)
-    keys, start, last = [0], 0, len(table) - 1
-    while start < last:
-        end, step, growing = start + 1, 1, True
-        while step > 0:
-            trial = min(end + step, last)
-            part = (times[start : trial + 1] - times[start]) / (times[trial] - times[start])
-            line = table[start] + part[:, None] * (table[trial] - table[start])
-            fits = trial > end and bool((np.abs(line - table[start : trial + 1]) <= scale).all())
-            end = trial if fits else end
-            growing = growing and fits
-            step = step * 2 if growing else step // 2
-        keys.append(end)
-        start = end
-    return keys
+            part[frame, slice(STRENGTH, SHADE) if place < picks else -1] = 0
 
 
 def _stills(
     mattes: Sequence[tuple[NDArray[np.float32], Sequence[float], Sequence[float]]],
+    display: Sequence[float],
 ) -> tuple[list[int], list[float], int]:
-    """Return the still grids; the values, shares and first points that they need; bits a code."""
+    """Return the still grids; the display, then values, shares and first points; codes' base."""
     heads: list[int] = []
     rest: list[int] = []
-    values: list[float] = []
-    books = [np.unique(grid, return_inverse=True) for grid, _, _ in mattes]
-    bits = max(len(levels) - 1 for levels, _ in books).bit_length() or 1
-    for (grid, shares, point), (levels, inverse) in zip(mattes, books, strict=True):
+    values = list(display)
+    found = [np.unique(grid, return_inverse=True) for grid, _, _ in mattes]
+    base = max(2, *(len(levels) for levels, _ in found))
+    for (grid, shares, point), (levels, inverse) in zip(mattes, found, strict=True):
         used = np.flatnonzero(grid.any(axis=(1, 2)))
         first, last = (int(used[0]), int(used[-1])) if len(used) else (0, -1)
         codes = inverse.reshape(grid.shape)
@@ -208,9 +235,9 @@ def _stills(
         start = 6 * len(mattes) + len(rest)
         heads += [first, last - first + 1, start, start + len(lines), len(values)]
         heads.append(len(values) + len(book))
-        rest += lines + _packed(shell, bits)
+        rest += lines + _packed(shell, base)
         values += book.tolist() + list(shares) + list(point)
-    return heads + rest, values, bits
+    return heads + rest, values, base
 
 
 def _lines(
@@ -245,12 +272,17 @@ def _lines(
     return lines, bytes(shell)
 
 
-def _packed(codes: bytes, bits: int) -> list[int]:
-    """Return codes of some bits in numbers of 32."""
-    each = 32 // bits
-    padded = np.frombuffer(codes + bytes(-len(codes) % each), np.uint8).astype(np.uint64)
-    places = np.arange(each, dtype=np.uint64) * np.uint64(bits)
-    return [int(number) for number in (padded.reshape(-1, each) << places).sum(axis=1)]
+def _packed(codes: bytes, base: int) -> list[int]:
+    """Return codes in words."""
+    each = codes_in_word(base)
+    padded = np.frombuffer(codes + bytes(-len(codes) % each), np.uint8).reshape(-1, each)
+    words: list[int] = (padded @ base ** np.arange(each)).tolist()
+    return words
+
+
+def codes_in_word(base: int) -> int:
+    """Return the codes below a number that have room in 31 bits."""
+    return next(n for n in range(31, 0, -1) if base**n <= 1 << 31)
 
 
 def _longest(run: NDArray[np.bool_]) -> tuple[int, int]:

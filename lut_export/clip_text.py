@@ -6,24 +6,30 @@ displacements are stored at a few times (`keys_of`), between which each pixel in
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.lut_export.clip_conversion import Conversion
-from palette4d.lut_export.clip_picks import PickConstants, pick_constants
+from palette4d.lut_export.clip_keys import F64, bends, keys_of
+from palette4d.lut_export.clip_picks import PickConstants, codes_in_word, pick_constants
 from palette4d.lut_export.frame_edit import check_frame
 
 from palette4d import _core
 from palette4d.common.arguments import frames_between, parse_frames
 from palette4d.common.errors import Arg, Palette4dError
 
-F64 = NDArray[np.float64]
 Numbers = list[int] | list[float]
 
 #: Bytes of constants: CUDA's constant memory.
 MOST_BYTES = 65536
 #: Values of the picks' mattes, of which the first that has room is taken; 0: as many as they have.
-LEVELS = (0, 32, 16, 8, 4)
+#: Of these most codes have room in a word.
+LEVELS = (0, 35, 21, 14, 10, 8, 6, 4)
+#: By how many code values fewer values may be off, unless the user accepts more: 5 of 255.
+MAX_ERROR = 0.02
+#: Frames at which that is measured, and colours at each. More take longer; fewer miss the largest.
+MEASURED, MEASURED_COLOURS = 48, 100_000
 #: Code values by which the interpolated palette may differ at a frame of the clip.
 TOLERANCE = 2e-6
 
@@ -35,7 +41,7 @@ class ClipText:
     Attributes
     ----------
     first, last : the clip's frames that it knows; before and after them the nearest holds.
-    keys : times at which the palette is stored.
+    keys, pick_keys : times at which the palette is stored, and at which picks and holds are.
     levels : values that the picks' mattes were reduced to; 0: they are exact.
     error : in the palette's code values, what that changes.
     arrays : constants by name; numbers are all float, or all int.
@@ -48,6 +54,7 @@ class ClipText:
     first: int
     last: int
     keys: int
+    pick_keys: int
     levels: int
     error: float
     arrays: dict[str, Numbers]
@@ -71,12 +78,18 @@ class _State:
 
 
 def clip_text(
-    sidecar: _core.Sidecar, frames: str | None, output: object, *, textures: bool
+    sidecar: _core.Sidecar,
+    frames: str | None,
+    output: object,
+    *,
+    textures: bool,
+    max_error: float = MAX_ERROR,
 ) -> ClipText:
     """Return a sidecar's palette, edits, picks and conversion at the frames of a range.
 
     `textures`: whether the dialect has them. Else mattes are reduced so far that they have room.
-    Palette4dError where all takes more than `MOST_BYTES`; `output` is named in it.
+    Palette4dError where all takes more than `MOST_BYTES`, or where that takes an error of more than
+    `max_error`; `output` is named in it.
     """
     times = _frames(sidecar, frames)
     if windows := dict.fromkeys(id_ for time in times for id_ in sidecar.edits.windows_at(time)):
@@ -87,10 +100,11 @@ def clip_text(
             f"{ids}"
         )
     states = [_state(sidecar, frame) for frame in times]
-    keys = keys_of(np.array(times), states)
-    arrays = _arrays(times, states, keys)
+    keys = keys_of(len(times), lambda key, end: _bends(times, states, key, end) is not None)
+    arrays, width = _arrays(times, states, keys)
     defines = [
         f"#define P4D_KEYS {len(keys)}",
+        f"#define P4D_WIDTH {width}",
         f"#define P4D_CONVEX_ALL {int(all(state.convex for state in states))}",
         "#define P4D_TIME(k) p4d_times[k]",
         "#define P4D_BODY(k) p4d_bodies[k]",
@@ -112,72 +126,101 @@ def clip_text(
             f"({Arg('frames')}), or parts of it to a file each"
         )
     room = MOST_BYTES - _size(arrays)
-    levels, picks = _picks(sidecar, times, room, output, textures=textures)
+    levels, picks, error = _picks(sidecar, times, room, output, textures, max_error)
     texture, texts = None, [_core.kernel_text("clip")]
     if picks is not None:
+        arrays["p4d_times"] += picks.times
+        tracks = np.add(picks.tracks, [len(keys), len(keys), 0, 0, 0])
         arrays |= {
-            "p4d_pick_times": picks.times,
-            "p4d_pick_tables": picks.tables.ravel().tolist(),
             "p4d_pick_columns": picks.columns,
             "p4d_pick_fixed": picks.fixed,
+            "p4d_pick_tracks": tracks.ravel().tolist(),
+            "p4d_pick_values": picks.values,
         }
         if textures:
             texture = picks.texture
             read = "p4d_word(i)", f"intBitsToFloat(p4d_word({len(picks.stills)} + (i)))"
         else:
-            arrays |= {"p4d_stills": picks.stills, "p4d_books": picks.values}
+            arrays |= {"p4d_stills": picks.stills, "p4d_books": picks.books}
             read = "p4d_stills[i]", "p4d_books[i]"
+        column = "p4d_pick_columns[i]"
         defines += [
-            "#define P4D_TABLE int t_, int n_, float w_,",
-            "#define P4D_PASS t_, n_, w_,",
-            "#define P4D_T(i) p4d_timed(i, t_, n_, w_)",
+            "#define P4D_TABLE p4d_now now_,",
+            "#define P4D_PASS now_,",
+            # Where i is constant, GLSL refuses an index that is out of bounds in any branch.
+            "#define P4D_FIXED(i) p4d_pick_fixed[i < 0 ? -1 - i : 0]",
+            "#define P4D_NOW(i) now_.t[i < 0 ? 0 : i]",
+            f"#define P4D_T(i) ({column} < 0 ? P4D_FIXED({column}) : P4D_NOW({column}))",
             f"#define P4D_S(i) {read[0]}",
             f"#define P4D_G(i) {read[1]}",
-            f"#define P4D_BITS {picks.bits}",
-            f"#define P4D_PICK_KEYS {len(picks.times)}",
-            "#define P4D_PICK_TIME(k) p4d_pick_times[k]",
-            f"#define P4D_PICK_FIRST(k) ({picks.tables.shape[1]} * (k))",
+            f"#define P4D_BASE {picks.base}",
+            f"#define P4D_CODES {codes_in_word(picks.base)}",
+            f"#define P4D_TRACKS {len(picks.tracks)}",
+            f"#define P4D_MOVING {picks.moving}",
+            "#define P4D_TRACK(i) p4d_pick_tracks[i]",
+            "#define P4D_V(i) p4d_pick_values[i]",
         ]
-        texts += [_TIMED, _core.kernel_text("clip_picks")]
+        texts.append(_core.kernel_text("clip_picks"))
     text = "\n".join([*texts, *conversion, _core.kernel_text("clip_main")])
-    error = _error(sidecar, levels, picks.times) if picks is not None and levels else 0.0
-    first, last = int(times[0]), int(times[-1])
     return ClipText(
-        first, last, len(keys), levels, error, arrays, texture, "\n".join(defines), text
+        int(times[0]),
+        int(times[-1]),
+        len(keys),
+        len(picks.times) if picks is not None else 0,
+        levels,
+        error,
+        arrays,
+        texture,
+        "\n".join(defines),
+        text,
     )
 
 
 def _picks(
-    sidecar: _core.Sidecar, times: Sequence[float], room: int, output: object, *, textures: bool
-) -> tuple[int, PickConstants | None]:
-    """Return the picks with as many values in their mattes as have room, and how many."""
-    size = 0
-    for levels in LEVELS:
-        edits = sidecar.edits.with_matte_levels(levels)
-        try:
-            picks = pick_constants(edits, times, [_recolourer(sidecar, edits, t) for t in times])
-        except ValueError as error:
-            raise Palette4dError(f"{output}: {error}") from error
-        if picks is None:
-            return 0, None
-        size = picks.table_size if textures else picks.size
-        if size <= room:
-            return levels, picks
+    sidecar: _core.Sidecar,
+    times: Sequence[float],
+    room: int,
+    output: object,
+    textures: bool,
+    max_error: float,
+) -> tuple[int, PickConstants | None, float]:
+    """Return the picks with as many values in their mattes as have room, how many, their error."""
+    edits = sidecar.edits
+    try:
+        picks = pick_constants(edits, times, [_recolourer(sidecar, edits, t) for t in times])
+    except ValueError as error:
+        raise Palette4dError(f"{output}: {error}") from error
+    if picks is None:
+        return 0, None, 0.0
+    less = f"switch picks off, or export a range of the clip ({Arg('frames')})"
+    size = picks.table_size
+    for levels in (0,) if textures else LEVELS:
+        reduced = picks.with_mattes(edits.with_matte_levels(levels)) if levels else picks
+        size = reduced.table_size if textures else reduced.size
+        if size > room:
+            continue
+        off = _error(sidecar, levels, times) if levels else 0.0
+        if off > max_error:
+            raise Palette4dError(
+                f"{output}: found code values off by up to {off:.2g}, since the mattes of picks "
+                f"have room for {levels} values only; expected at most {max_error:.2g}: {less}, or "
+                f"accept that ({Arg('max_error', ceil(off * 100) / 100)})"
+            )
+        return levels, reduced, off
     raise Palette4dError(
-        f"{output}: found {size / 1024:.0f} KB of picks and holds, reduced as far as they can be, "
-        f"and there is room for {room / 1024:.0f} KB of {MOST_BYTES // 1024} KB: switch picks off, "
-        f"or export a range of the clip ({Arg('frames')})"
+        f"{output}: found {size / 1024:.0f} KB of picks and holds, as few as they can be, and "
+        f"there is room for {room / 1024:.0f} KB of {MOST_BYTES // 1024} KB: {less}"
     )
 
 
 def _error(sidecar: _core.Sidecar, levels: int, times: Sequence[float]) -> float:
-    """Return the largest change of a code value, over a grid of colours, by reduced mattes."""
-    axis = np.linspace(0, 1, 49, dtype=np.float32)
-    grid = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(1, -1, 3)
+    """Return the largest change of a code value by reduced mattes, at some frames and colours."""
+    draws = np.random.default_rng(1)
     edits = sidecar.edits, sidecar.edits.with_matte_levels(levels)
     largest = 0.0
-    for frame in times[:: -(-len(times) // 9)]:
-        exact, reduced = (_recolourer(sidecar, e, frame).apply(grid) for e in edits)
+    for i in sorted({round(at) for at in np.linspace(0, len(times) - 1, MEASURED)}):
+        colours = draws.random((1, MEASURED_COLOURS, 3), np.float32)
+        exact, reduced = (_recolourer(sidecar, e, times[i]).apply(colours) for e in edits)
         largest = max(largest, float(np.abs(exact - reduced).max()))
     return largest
 
@@ -185,18 +228,6 @@ def _error(sidecar: _core.Sidecar, levels: int, times: Sequence[float]) -> float
 def _size(arrays: dict[str, Numbers]) -> int:
     """Return the bytes of constants."""
     return 4 * sum(map(len, arrays.values()))
-
-
-_TIMED = """
-P4D_FN float p4d_timed(int i, int now, int next, float w) {
-    int column = p4d_pick_columns[i];
-    float a, b;
-    if (column < 0) return p4d_pick_fixed[-1 - column];
-    a = p4d_pick_tables[now + column];
-    b = p4d_pick_tables[next + column];
-    return a + w * (b - a);
-}
-"""
 
 
 def _recolourer(sidecar: _core.Sidecar, edits: _core.Edits, frame: float) -> _core.Recolourer:
@@ -243,70 +274,48 @@ def _state(sidecar: _core.Sidecar, frame: float) -> _State:
     return _State(np.concatenate([rgb, edited - rgb], axis=1), body, convex or not solid)
 
 
-def bends(times: F64, states: Sequence[_State]) -> tuple[F64, float]:
-    """Return how displacements go from the first state to the last, and the largest error between.
+def _bends(times: Sequence[float], states: Sequence[_State], key: int, end: int) -> F64 | None:
+    """Return how displacements bend, (n, 6), on the way to `end`; None: not all states follow.
 
-    Colours go in straight lines. A channel's displacement is d + w (d' - d + (1 - w) (a + b w)),
-    where w is the part of the time: a cubic. The result is a and b of each channel, (n, 6).
+    Colours go in straight lines.
     """
-    values = np.stack([state.values for state in states])
-    part = (times - times[0]) / (times[-1] - times[0])
-    straight = values[0] + part[:, None, None] * (values[-1] - values[0])
-    shape = (part * (1 - part))[:, None] * np.stack([np.ones_like(part), part], axis=1)
-    rest = (values - straight)[:, :, 3:].reshape(len(times), -1)
-    slopes = np.zeros((2, rest.shape[1]))
-    if len(times) > 2:
-        slopes = np.linalg.lstsq(shape, rest, rcond=None)[0]
-        slopes[np.abs(slopes) < TOLERANCE] = 0
-    bend = slopes.T.reshape(len(values[0]), 3, 2).transpose(0, 2, 1).reshape(-1, 6)
-    error = np.abs(rest - shape @ slopes).max(initial=np.abs((values - straight)[:, :, :3]).max())
-    return bend, float(error)
-
-
-def keys_of(times: F64, states: Sequence[_State]) -> list[tuple[int, F64]]:
-    """Return the fewest states between which all others follow, each with its `bends`."""
-    keys, start, last = [], 0, len(states) - 1
-    while start < last:
-        end, step, bend = start + 1, 1, np.zeros((len(states[start].values), 6))
-        # Doubles the step as long as it fits, then halves it.
-        growing = True
-        while step > 0:
-            trial = min(end + step, last)
-            one_body = all(s.body == states[start].body for s in states[end : trial + 1])
-            fits = one_body and trial > end
-            if fits:
-                bent, error = bends(times[start : trial + 1], states[start : trial + 1])
-                fits = error <= TOLERANCE
-            if fits:
-                end, bend = trial, bent
-            growing = growing and fits
-            step = step * 2 if growing else step // 2
-        keys.append((start, bend))
-        start = end
-    return [*keys, (last, np.zeros((len(states[last].values), 6)))]
+    if any(state.body != states[key].body for state in states[key : end + 1]):
+        return None
+    values = np.stack([state.values for state in states[key : end + 1]])
+    part = np.array(times[key : end + 1])
+    way = ((part - part[0]) / (part[-1] - part[0]))[:, None, None]
+    straight = values[0] + way * (values[-1] - values[0])
+    bent, errors = bends(part, values[:, :, 3:].reshape(len(part), -1))
+    if np.abs(values - straight)[:, :, :3].max(initial=errors.max()) > TOLERANCE:
+        return None
+    return bent.T.reshape(-1, 3, 2).transpose(0, 2, 1).reshape(-1, 6)
 
 
 def _arrays(
-    times: Sequence[float], states: Sequence[_State], keys: Sequence[tuple[int, F64]]
-) -> dict[str, Numbers]:
-    """Return the palette's arrays."""
+    times: Sequence[float], states: Sequence[_State], keys: Sequence[int]
+) -> tuple[dict[str, Numbers], int]:
+    """Return the palette's arrays, and how many values a colour has."""
     faces: list[int] = []
     known: dict[tuple[int, ...], int] = {}
     bodies: list[int] = []
-    firsts: list[int] = []
-    values: list[float] = []
-    for key, bend in keys:
+    rows: list[F64] = []
+    for key, end in zip(keys, [*keys[1:], keys[-1]], strict=True):
         state = states[key]
         if state.body not in known:
             known[state.body] = len(faces)
             faces += state.body
         bodies.append(known[state.body])
-        firsts.append(len(values))
-        values += np.concatenate([state.values, bend], axis=1).ravel().tolist()
-    return {
-        "p4d_times": [times[key] for key, _ in keys],
+        bend = _bends(times, states, key, end) if end > key else None
+        bend = np.zeros_like(state.values) if bend is None else bend  # to another body, or the last
+        rows.append(np.concatenate([state.values, bend], axis=1))
+    values = np.concatenate(rows)
+    width = next(n for n in (3, 6, 12) if not values[:, n:].any())
+    firsts = width * np.cumsum([0, *map(len, rows[:-1])])
+    arrays: dict[str, Numbers] = {
+        "p4d_times": [times[key] for key in keys],
         "p4d_bodies": bodies,
-        "p4d_firsts": firsts,
+        "p4d_firsts": firsts.tolist(),
         "p4d_faces": faces,
-        "p4d_values": values,
+        "p4d_values": values[:, :width].ravel().tolist(),
     }
+    return arrays, width

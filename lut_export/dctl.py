@@ -3,7 +3,7 @@
 import os
 
 from palette4d.lut_export.clip_file import ClipExport, Dialect, write_clip
-from palette4d.lut_export.clip_text import ClipText
+from palette4d.lut_export.clip_text import MAX_ERROR, ClipText
 
 from palette4d.grade.document import Document
 
@@ -44,6 +44,7 @@ def export_dctl(
     *,
     frames: str | None = None,
     alpha: bool = False,
+    max_error: float = MAX_ERROR,
     force: bool = False,
 ) -> ClipExport:
     """Write a sidecar's palette, edits, picks and ramps as a DCTL file for DaVinci Resolve.
@@ -58,6 +59,8 @@ def export_dctl(
         A range of the clip, such as "1001-1100"; by default all of it.
     alpha : bool
         Keep the picture's alpha, straight; needs DaVinci Resolve 19.1.
+    max_error : float
+        How far off code values may be where the mattes of picks get fewer values, to have room.
     force : bool
         Replace an existing file.
 
@@ -71,10 +74,12 @@ def export_dctl(
     SidecarError
         The sidecar is unusable.
     Palette4dError
-        The clip takes more than `MOST_BYTES`; nothing was written.
+        The clip takes more than `MOST_BYTES`, or has room only with a larger error; nothing was
+        written.
     """
 
     def text(clip: ClipText, _: str, body: str) -> str:
         return _TEXT.format(offset=clip.first - 1, body=body, **(_WITH_ALPHA if alpha else _PLAIN))
 
-    return write_clip(source, path, _DCTL, {".dctl": text}, frames=frames, force=force)
+    forms = {".dctl": text}
+    return write_clip(source, path, _DCTL, forms, frames=frames, force=force, max_error=max_error)

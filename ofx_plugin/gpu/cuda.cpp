@@ -97,7 +97,8 @@ public:
         : cu_(functions), stream_(stream), waits_(waits), push_(push) {
         if (push_) cu_.cuCtxPushCurrent_v2(context);
         key_ = current_context(cu_);
-        module_ = Modules::of_process().get(key_, [] { return std::make_shared<Module>(); });
+        module_ =
+            Modules::of_process().get(key_, nullptr, [] { return std::make_shared<Module>(); });
     }
     ~CudaQueue() override {
         Handle context = nullptr;

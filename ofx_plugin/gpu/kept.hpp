@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <new>
+#include <set>
 #include <utility>
 
 namespace palette4d::gpu {
@@ -25,18 +26,22 @@ public:
         return *all;
     }
 
-    /// The key's value, made by make() where there is none.
+    /// The key's value for a node, made by make() where there is none.
     template <class Make>
-    std::shared_ptr<Value> get(const Key& key, Make make) {
+    std::shared_ptr<Value> get(const Key& key, const void* node, Make make) {
         const std::lock_guard<std::mutex> lock(mutex_);
-        for (auto at = all_.begin(); at != all_.end(); ++at) {
-            if (at->first != key) continue;
-            all_.splice(all_.begin(), all_, at);
-            return all_.front().second;
-        }
-        all_.emplace_front(key, make());
+        auto at = all_.begin();
+        while (at != all_.end() && at->key != key) ++at;
+        if (at == all_.end()) at = all_.insert(at, {key, make(), {}});
+        all_.splice(all_.begin(), all_, at);
         if (all_.size() > kMost) all_.pop_back();
-        return all_.front().second;
+        all_.front().nodes.insert(node);
+        return all_.front().value;
+    }
+    /// Drops what no other node has used.
+    void leave(const void* node) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        all_.remove_if([&](One& one) { return one.nodes.erase(node) > 0 && one.nodes.empty(); });
     }
     void clear() {
         const std::lock_guard<std::mutex> lock(mutex_);
@@ -44,8 +49,13 @@ public:
     }
 
 private:
+    struct One {
+        Key key;
+        std::shared_ptr<Value> value;
+        std::set<const void*> nodes;
+    };
     std::mutex mutex_;
-    std::list<std::pair<Key, std::shared_ptr<Value>>> all_;
+    std::list<One> all_;
 };
 
 }  // namespace palette4d::gpu

@@ -103,7 +103,7 @@ public:
     MetalQueue(const MetalFunctions& functions, Handle queue, Handle device)
         : mt_(functions), queue_(queue), device_(device) {
         pipeline_ = Pipelines::of_process().get(
-            device, [&] { return std::make_shared<Pipeline>(mt_, device); });
+            device, nullptr, [&] { return std::make_shared<Pipeline>(mt_, device); });
     }
 
     std::string device() const override {

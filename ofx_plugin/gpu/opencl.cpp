@@ -1,6 +1,7 @@
 // OpenCL 1.1, as hosts have it: their queue, and buffers in place of pixels.
 #include <array>
 #include <cstdint>
+#include <cstring>
 #include <utility>
 #include <vector>
 
@@ -63,16 +64,36 @@ const ClFunctions* cl_functions() {
     return all.complete ? &all : nullptr;
 }
 
+/// A buffer of numbers; released with this, which the driver allows before it is used.
+struct Buffer {
+    const ClFunctions& cl;
+    const std::vector<float> numbers;
+    Handle memory;
+    Buffer(const ClFunctions& functions, Handle context, const std::vector<float>& of, Int& error)
+        : cl(functions),
+          numbers(of),
+          memory(cl.clCreateBuffer(context, kReadOnlyCopied, of.size() * sizeof(float),
+                                   const_cast<float*>(numbers.data()), &error)) {}
+    ~Buffer() {
+        if (memory) cl.clReleaseMemObject(memory);
+    }
+    Buffer(const Buffer&) = delete;
+    Buffer& operator=(const Buffer&) = delete;
+};
+
 /// The kernel's program for a device of a context.
 struct Program : Context {
     const ClFunctions& cl;
     Handle context, program = nullptr;
     bool kept;
+    std::mutex of_last{};
+    std::shared_ptr<const Buffer> table{}, grids{};  ///< the last frame's
 
     /// Keeps the context, so that no other one gets its handle.
     Program(const ClFunctions& functions, Handle of)
         : cl(functions), context(of), kept(cl.clRetainContext(of) == 0) {}
     ~Program() {
+        table = grids = nullptr;
         if (program) cl.clReleaseProgram(program);
         if (kept) cl.clReleaseContext(context);
     }
@@ -88,6 +109,20 @@ struct Program : Context {
         error = cl.clBuildProgram(program, 1, &device, "", nullptr, nullptr);
         return error ? driver_error("clBuildProgram", error) : "";
     }
+
+    /// The buffer of these numbers: `last`, if it is that, else a new one in its place.
+    std::shared_ptr<const Buffer> buffer(const std::vector<float>& numbers,
+                                         std::shared_ptr<const Buffer>& last, Int& error) {
+        const std::lock_guard<std::mutex> lock(of_last);
+        const auto same = [&](const std::vector<float>& other) {
+            return other.size() == numbers.size() &&
+                   std::memcmp(other.data(), numbers.data(), sizeof(float) * numbers.size()) == 0;
+        };
+        if (last && same(last->numbers)) return last;
+        const auto made = std::make_shared<const Buffer>(cl, context, numbers, error);
+        last = made->memory ? made : nullptr;
+        return last;
+    }
 };
 
 using ClKey = std::pair<Handle, Handle>;  ///< context and device
@@ -95,10 +130,11 @@ using Programs = Kept<ClKey, Program>;
 
 class OpenClQueue final : public Queue {
 public:
-    OpenClQueue(const ClFunctions& functions, Handle queue, Handle context, Handle device)
+    OpenClQueue(const ClFunctions& functions, Handle queue, Handle context, Handle device,
+                const void* node)
         : cl_(functions), queue_(queue), context_(context), device_(device) {
         program_ = Programs::of_process().get(
-            {context, device}, [&] { return std::make_shared<Program>(cl_, context); });
+            {context, device}, node, [&] { return std::make_shared<Program>(cl_, context); });
     }
 
     std::string device() const override {
@@ -125,21 +161,6 @@ public:
     }
 
 private:
-    /// A buffer of the numbers; released with this, which the driver allows before it is used.
-    struct Buffer {
-        const ClFunctions& cl;
-        Handle memory;
-        Buffer(const ClFunctions& functions, Handle context, const std::vector<float>& numbers,
-               Int& error)
-            : cl(functions),
-              memory(cl.clCreateBuffer(context, kReadOnlyCopied, numbers.size() * sizeof(float),
-                                       const_cast<float*>(numbers.data()), &error)) {}
-        ~Buffer() {
-            if (memory) cl.clReleaseMemObject(memory);
-        }
-        Buffer(const Buffer&) = delete;
-        Buffer& operator=(const Buffer&) = delete;
-    };
     struct Kernel {
         const ClFunctions& cl;
         Handle kernel;
@@ -160,15 +181,15 @@ private:
         cl_.clGetDeviceInfo(device_, kDeviceMaxConstant, sizeof most, &most, nullptr);
         if (most < frame.table.size() * sizeof(float)) return "too little constant memory";
         Int error = 0;
-        const Buffer table(cl_, context_, frame.table, error);
-        if (!table.memory) return driver_error("clCreateBuffer", error);
-        const Buffer grids(cl_, context_, frame.grids, error);
-        if (!grids.memory) return driver_error("clCreateBuffer", error);
+        const auto table = program_->buffer(frame.table, program_->table, error);
+        if (!table) return driver_error("clCreateBuffer", error);
+        const auto grids = program_->buffer(frame.grids, program_->grids, error);
+        if (!grids) return driver_error("clCreateBuffer", error);
         void* memory = window.out.data;  // where no kernel reads it
         std::string problem = scratch(frame, queue_, memory);
         for (const Pass& pass : passes_of(frame, window)) {
             if (problem.empty())
-                problem = enqueue(pass, window, {table.memory, grids.memory, memory});
+                problem = enqueue(pass, window, {table->memory, grids->memory, memory});
         }
         if (!problem.empty()) return problem;
         error = cl_.clFlush(queue_);
@@ -259,7 +280,7 @@ private:
 
 }  // namespace
 
-std::unique_ptr<Queue> opencl_queue(void* queue) {
+std::unique_ptr<Queue> opencl_queue(void* queue, const void* node) {
     const ClFunctions* const cl = cl_functions();
     Handle context = nullptr, device = nullptr;
     if (!cl || !queue ||
@@ -267,9 +288,10 @@ std::unique_ptr<Queue> opencl_queue(void* queue) {
         cl->clGetCommandQueueInfo(queue, kQueueDevice, sizeof device, &device, nullptr)) {
         return nullptr;
     }
-    return std::make_unique<OpenClQueue>(*cl, queue, context, device);
+    return std::make_unique<OpenClQueue>(*cl, queue, context, device, node);
 }
 
+void leave_opencl(const void* node) { Programs::of_process().leave(node); }
 void purge_opencl() { Programs::of_process().clear(); }
 
 }  // namespace palette4d::gpu

@@ -74,9 +74,12 @@ std::shared_ptr<char> Queue::memory(std::size_t bytes) {
             }};
 }
 
+void leave_opencl(const void* node);
 void purge_opencl();
 void purge_cuda();
 void purge_metal();
+
+void leave(const void* node) { leave_opencl(node); }
 
 void purge() {
     purge_opencl();

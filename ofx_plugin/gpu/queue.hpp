@@ -104,14 +104,16 @@ protected:
     }
 };
 
-/// A cl_command_queue. Null where OpenCL cannot be loaded.
-std::unique_ptr<Queue> opencl_queue(void* queue);
+/// A cl_command_queue, for a node. Null where OpenCL cannot be loaded.
+std::unique_ptr<Queue> opencl_queue(void* queue, const void* node);
 /// A CUstream of the current context; null: the default one, and all calls wait. Null where CUDA
 /// cannot be loaded.
 std::unique_ptr<Queue> cuda_queue(void* stream, bool waits);
 /// An id<MTLCommandQueue>. Null where there is no Objective-C.
 std::unique_ptr<Queue> metal_queue(void* queue);
 
+/// A node ends: frees what is kept for contexts of OpenCL that no other node has used.
+void leave(const void* node);
 /// Frees what is kept for contexts. Only while no queue is in use.
 void purge();
 

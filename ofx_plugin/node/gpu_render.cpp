@@ -86,11 +86,11 @@ bool gpu_wanted(const Params& params, OfxTime time) {
     return params.int_at(kParamGpu, time).value_or(0) == 0;
 }
 
-GpuRender::GpuRender(const Properties& arguments) {
+GpuRender::GpuRender(const Properties& arguments, OfxImageEffectHandle effect) {
     if (is_on(arguments, kOfxImageEffectPropOpenCLEnabled)) {
         enabled = true;
         queue = gpu::opencl_queue(
-            arguments.get_pointer(kOfxImageEffectPropOpenCLCommandQueue).value_or(nullptr));
+            arguments.get_pointer(kOfxImageEffectPropOpenCLCommandQueue).value_or(nullptr), effect);
     } else if (is_on(arguments, kOfxImageEffectPropCudaEnabled)) {
         enabled = true;
         void* const stream = arguments.get_pointer(kOfxImageEffectPropCudaStream).value_or(nullptr);

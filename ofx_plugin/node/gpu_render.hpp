@@ -28,7 +28,7 @@ bool gpu_wanted(const Params& params, OfxTime time);
 struct GpuRender {
     bool enabled = false;               ///< the images' data are a GPU's
     std::unique_ptr<gpu::Queue> queue;  ///< null where they are, and the system is not to be had
-    explicit GpuRender(const Properties& render_arguments);
+    GpuRender(const Properties& render_arguments, OfxImageEffectHandle effect);
 };
 
 /// Draws the window with the kernel; `in` is null for transparent black, and `place` is where it is

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "buttons.hpp"
+#include "gpu/queue.hpp"
 #include "handle_params.hpp"
 #include "host_time.hpp"
 #include "output_params.hpp"
@@ -120,6 +121,7 @@ void create_instance(const Suites& suites, OfxImageEffectHandle effect) {
 }
 
 void destroy_instance(OfxImageEffectHandle effect) {
+    gpu::leave(effect);
     Registry& all = registry();
     const std::lock_guard<std::mutex> lock(all.mutex);
     all.instances.erase(effect);

@@ -382,7 +382,7 @@ OfxStatus render(const Suites& suites, OfxImageEffectHandle effect, const Proper
     }
     Plan plan = plan_of(suites, effect, in_args, *time, pictures);
     const Scale scale = scale_of(in_args);
-    const GpuRender gpu(in_args);
+    const GpuRender gpu(in_args, effect);
     if (!gpu.enabled) return draw_here(suites, effect, pictures, window, scale, plan);
     // Without its system, what the host hands over cannot even be read.
     if (!gpu.queue) return kOfxStatGPURenderFailed;

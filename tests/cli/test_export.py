@@ -195,8 +195,26 @@ def test_a_dctl_is_one_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert "frames 0 to 20 from " in capsys.readouterr().out
     assert "p4d_at_frame" in output.read_text(encoding="ascii")
     assert dctl("--dctl", output, "--frames", "2-5", "--json") == 1
-    assert dctl("--dctl", output, "--frames", "2-5", "--json", "--force") == 0
+    assert dctl("--dctl", output, "--frames", "2-5", "--json", "--force", "--max-error", "0") == 0
     assert json.loads(capsys.readouterr().out)["last"] == 5
+
+
+def test_a_dctl_says_its_error_and_refuses_more(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document = Document.load(EDITED)
+    seen = document.grade.palette(4).rgb.mean(axis=0)
+    document.pick(4, colour=seen, by=(0.2, 0, 0), follow=False)
+    document.save(tmp_path / "picked.p4d.json")
+    words = ["export", tmp_path / "picked.p4d.json", "--dctl", tmp_path / "a.dctl"]
+    monkeypatch.setattr("palette4d.lut_export.clip_text.MOST_BYTES", 6000)
+    assert main([*map(str, words), "--max-error", "0.0001"]) == 1
+    assert "(--frames), or accept that (--max-error 0.0" in capsys.readouterr().err
+    assert not (tmp_path / "a.dctl").exists()
+    assert main([*map(str, words)]) == 0
+    printed = capsys.readouterr()
+    assert "off by up to 0.0" in printed.err
+    assert " of picks, " in printed.out
 
 
 @pytest.mark.parametrize(
@@ -206,6 +224,7 @@ def test_a_dctl_is_one_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         (("--dctl", "a.dctl", "--size", "9"), "--dctl"),
         (("--dctl", "a.dctl", "--strength", "0.5"), "--dctl"),
         (("--glsl", "a.glsl", "--format", "clf"), "--glsl"),
+        (("--glsl", "a.glsl", "--max-error", "0.1"), "--glsl"),
         (("--dctl", "a.dctl", "--glsl", "a.glsl"), "--glsl"),
         (("--every", "1", "-o", "luts", "--alpha"), "--dctl"),
         (("--every", "1"), "--output"),

@@ -14,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 from opencl import run
 from palette4d.lut_export import clip_file, clip_text
+from palette4d.lut_export.frame_edit import frame_edit
 from parity.cases import (
     DOCUMENTS,
     Document,
@@ -23,10 +24,10 @@ from parity.cases import (
     split_merge_document,
 )
 from parity.kernel import compiler
-from whole_clips import CONVERTED, PROMISE, converted, exact
+from whole_clips import CONVERTED, PROMISE, converted, exact, moved_picks
 
 import palette4d
-from palette4d import Palette4dError
+from palette4d import Palette4dError, _core
 
 F32 = NDArray[np.float32]
 
@@ -235,7 +236,7 @@ def noisy(seed: int) -> NDArray[np.uint8]:
     return np.where(soft, np.clip(odds + noise, 1, 126), odds).astype(np.uint8)
 
 
-@pytest.mark.parametrize(("room", "levels"), [(65536, 32), (52000, 16), (44000, 8)])
+@pytest.mark.parametrize(("room", "levels"), [(65536, 35), (52000, 14), (44000, 10)])
 def test_mattes_get_fewer_values_where_they_have_no_room(
     room: int, levels: int, colours: F32, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -244,7 +245,7 @@ def test_mattes_get_fewer_values_where_they_have_no_room(
     picks = [{**pick, "softness": 0.9, "reach": 0} for pick in base["edits"]["picks"]]
     grids = {name: noisy(seed) for seed, name in enumerate("abc")}
     document = picked(base, picks, grids)
-    path, done = exported(document, tmp_path)
+    path, done = exported(document, tmp_path, max_error=0.05)
     assert done.matte_levels == levels
     assert 0.8 * room < done.constant_bytes <= room
     assert f"{done.matte_levels} values" in path.read_text(encoding="ascii").split("#", 1)[0]
@@ -253,8 +254,43 @@ def test_mattes_get_fewer_values_where_they_have_no_room(
     error = np.abs(found - exact(document, done.first, colours)).max()
     # The error was measured on other colours.
     assert 0.5 * done.error < error < 1.1 * done.error < 0.3 / levels
+    less = done.error * 0.99
+    with pytest.raises(Palette4dError, match=r"off by up to 0\.\d+.*frames=.*max_error=0\.0\d"):
+        exported(document, tmp_path, max_error=less)
     # One pick has room as it is.
     assert exported(picked(base, picks[:1], grids), tmp_path)[1].matte_levels == 0
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_picks_that_move_have_keys_of_their_own(held: bool, colours: F32, tmp_path: Path) -> None:
+    document = moved_picks(390, held=held)
+    path, done = exported(document, tmp_path)
+    # 27 times in each path, and some more where a path enters another cell of the grid.
+    assert done.keys < 12
+    assert done.pick_keys < 300
+    assert done.matte_levels == 0
+    assert done.constant_bytes < 64000
+    sidecar = _core.parse_sidecar(json.dumps(document), "case")
+    for name, flags in (("plain", ()), ("fast", ("-ffast-math",))):
+        named = path.rename(path.with_stem(name))
+        compiled, path = Compiled(named, *flags), named
+        for frame in range(391):
+            part = colours[:300]
+            found = compiled.draw(frame + 1, part)
+            assert np.abs(found - frame_edit(sidecar, frame).exact(part)).max() < PROMISE, frame
+
+
+def test_the_error_is_that_of_each_frame(colours: F32, tmp_path: Path) -> None:
+    document = moved_picks(60, held=True, odds=noisy)
+    path, done = exported(document, tmp_path)
+    assert done.matte_levels == 35
+    compiled = Compiled(path)
+    colours = colours.clip(0, 1)
+    errors = [
+        np.abs(compiled.draw(frame + 1, colours) - exact(document, frame, colours)).max()
+        for frame in range(0, 61, 3)
+    ]
+    assert 0.5 * done.error < max(errors) < 1.1 * done.error
 
 
 def test_what_a_dctl_cannot_hold_is_refused(

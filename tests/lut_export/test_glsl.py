@@ -13,7 +13,7 @@ import pytest
 from gpu_needed import lacks
 from numpy.typing import NDArray
 from parity.cases import DOCUMENTS, Document
-from whole_clips import CONVERTED, PROMISE, converted, exact
+from whole_clips import CONVERTED, PROMISE, converted, exact, moved_picks
 
 import palette4d
 from palette4d import Palette4dError
@@ -99,6 +99,16 @@ def test_the_function_draws_what_render_does(name: str, pixels: F32, tmp_path: P
     assert (
         gl.run(shader, pixels, {"p4d_frame": first, "p4d_strength": 0.0}, picks) == pixels
     ).all()
+
+
+def test_picks_that_move_are_whole(pixels: F32, tmp_path: Path) -> None:
+    document = moved_picks(390, held=True)
+    text, picks = exported(document, tmp_path)
+    assert len(text) < 100_000  # few keys
+    for frame in range(5, 391, 55):
+        uniforms = {"p4d_frame": frame, "p4d_strength": 1.0}
+        found = gl.run("#version 330\n" + text + MAIN, pixels, uniforms, picks)
+        assert np.abs(found[:, :3] - exact(document, frame, pixels[:, :3])).max() < PROMISE
 
 
 @pytest.mark.parametrize("name", CONVERTED)

@@ -27,14 +27,16 @@ With a manifest each shot's files go to a folder of its name; --otio writes a co
 clips name the shot's sidecar and files in their metadata ("palette4d").
 --dctl writes palette, edits and picks through time as one file for DaVinci Resolve, without LUTs;
 --glsl the same as a fragment function (NAME.glsl; with picks a texture NAME.rgba beside it) or as a
-shader for mpv (NAME.hook).
+shader for mpv (NAME.hook). A DCTL has room for 64 KB: then mattes of picks get fewer values. If
+code values are off by more than 0.02 of `render`, nothing is written: choose --frames, switch picks
+off, or accept more by --max-error.
 
 examples:
   palette4d export shot010.p4d.json --every 1 -o luts
   palette4d export shot010.p4d.json --frames 1001-1100x10 -o luts --format clf --max-error 0.02
   palette4d export shots/edit.shots.json --stops -o luts --otio edit_luts.otio
   palette4d export shots/edit.shots.json --stops -o cdls --format ccc --ccc show.ccc
-  palette4d export shot010.p4d.json --dctl shot010.dctl
+  palette4d export shot010.p4d.json --dctl shot010.dctl --max-error 0.05
   palette4d export shot010.p4d.json --glsl shot010.hook
 """
 
@@ -47,7 +49,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         description="Bake the edit at many frames, a file each, in parallel, with an index.",
         epilog=EPILOG,
         usage="%(prog)s SIDECAR (--every N | --stops | --frames RANGE) -o DIR [options]\n"
-        "       %(prog)s SIDECAR (--dctl OUT.dctl [--alpha] | --glsl OUT.glsl) [--frames RANGE]",
+        "       %(prog)s SIDECAR --dctl OUT.dctl [--alpha] [--frames RANGE] [--max-error E]\n"
+        "       %(prog)s SIDECAR --glsl OUT.glsl [--frames RANGE]",
         formatter_class=wide_help,
     )
     add = parser.add_argument
@@ -149,18 +152,24 @@ def _one_file(args: argparse.Namespace) -> int:
     """Write a DCTL or GLSL file; print its size."""
     from dataclasses import asdict
 
-    from palette4d.lut_export.clip_text import MOST_BYTES
+    from palette4d.lut_export.clip_text import MAX_ERROR, MOST_BYTES
     from palette4d.lut_export.dctl import export_dctl
     from palette4d.lut_export.glsl import export_glsl
 
     name = "--glsl" if args.dctl is None else "--dctl"
     of_series = {*export_settings(args), "output", "name", "padding", "otio", "ccc", "edl"}
-    others = of_series - {"frames", "force"}
+    others = of_series - {"frames", "force", *(["max_error"] if args.glsl is None else [])}
     if any(vars(args)[other] != args.parser.get_default(other) for other in others):
-        args.parser.error(f"{name}: only with --frames, --force, --json and --quiet")
+        limit = "--max-error, " if args.glsl is None else ""
+        args.parser.error(f"{name}: only with --frames, {limit}--force, --json and --quiet")
     if args.glsl is None:
         done = export_dctl(
-            args.sidecar, args.dctl, frames=args.frames, alpha=args.alpha, force=args.force
+            args.sidecar,
+            args.dctl,
+            frames=args.frames,
+            alpha=args.alpha,
+            max_error=MAX_ERROR if args.max_error is None else args.max_error,
+            force=args.force,
         )
     elif args.dctl is not None or args.alpha:
         args.parser.error("--glsl: not with --dctl or --alpha")
@@ -170,7 +179,8 @@ def _one_file(args: argparse.Namespace) -> int:
         print(json.dumps(asdict(done), indent=2))
     elif not args.quiet:
         print(
-            f"{done.output}: frames {done.first} to {done.last} from {counted(done.keys, 'key')}, "
+            f"{done.output}: frames {done.first} to {done.last} from {counted(done.keys, 'key')}"
+            f"{f' and {done.pick_keys} of picks' if done.pick_keys else ''}, "
             f"{done.constant_bytes / 1024:.1f} KB of {MOST_BYTES // 1024} KB"
         )
         if done.texture is not None:
