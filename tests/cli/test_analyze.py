@@ -64,6 +64,30 @@ def test_json_report_and_frames(clip, tmp_path, capsys):
     assert (frames["first"], frames["last"], frames["step"]) == (1002, 1006, 2)
 
 
+def test_picks_keep_their_places_when_a_clips_colour_space_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As the note on scene-linear clips asks; the pixels are the same, only their numbers change."""
+    halves = np.where(np.arange(24)[None, :, None] < 12, [0.5, 0.02, 0.02], [0.1, 0.1, 0.12])
+    for frame in range(1, 5):
+        pixels = (halves * (1 + frame / 100)).repeat(16, 0).astype(np.float32)
+        write_image(tmp_path / "v" / f"g.{frame:04d}.exr", pixels)
+    out = tmp_path / "g.p4d.json"
+    analyze = ["analyze", str(tmp_path / "v"), "-o", str(out), "--quiet"]
+    assert main.main(analyze) == 0
+    for place, to in (("5,8", "0.02 0.02 0.5"), ("18,8", "0.1 0.14 0.1")):
+        pick = ["pick", "--pixel", place, "--to", *to.split(), "--frame", "2"]
+        assert main.main(["edit", str(out), *pick]) == 0
+    capsys.readouterr()
+    again = [*analyze, "--keep-edits", "--input-space", "Linear Rec.709 (sRGB)"]
+    assert main.main(again) == 0
+    said = capsys.readouterr().err
+    assert "not copied" not in said
+    assert "picked where" not in said
+    kept = Document.load(out).grade.picks
+    assert [pick.pixel for pick in kept] == [(5, 8), (18, 8)]
+
+
 def test_the_files_bytes_are_the_same_every_time(clip, tmp_path):
     for name, threads in (("a", "1"), ("b", "4")):
         arguments = [

@@ -215,7 +215,9 @@ def copied(
     there = None if opened is None else [n for n in opened.frames if first <= n <= last]
     frames = there or range(first, last + 1, step)
     picks = (_pick(match, pick, frames, same_clip=same_clip) for pick in source.picks)
-    after, left_out, away = taken(after, clip, [pick for pick in picks if pick is not None])
+    spaces = {target.encoding, source.encoding}
+    told = len(spaces) == 1 or "unknown" not in spaces  # else no colours can be compared
+    after, left_out, away = taken(after, clip, [p for p in picks if p is not None], told=told)
     copies = {pick.id: pick for pick in after.picks}
     everywhere = [
         pick.id

@@ -331,13 +331,14 @@ def unpick(grade: Grade, clip: ClipOfPicks, *ids: str) -> Grade:
 
 
 def taken(
-    grade: Grade, clip: ClipOfPicks, picks: Iterable[Pick]
+    grade: Grade, clip: ClipOfPicks, picks: Iterable[Pick], *, told: bool = True
 ) -> tuple[Grade, list[str], list[str]]:
     """Take over picks of another palette, learned here.
 
-    Those with a place in this clip are picked there, if it has nearly their colour; of others the
-    colour is looked for. Without the clip they take all of their hue, as they cannot be learned.
-    Return also those whose colour is not here, and the ids of those whose place has another one.
+    Those with a place in this clip are picked there, if it has nearly their colour, or if it is not
+    `told` what colours the other palette's numbers are; of others the colour is looked for. Without
+    the clip they take all of their hue, as they cannot be learned. Return also those whose colour
+    is not here, and the ids of those whose place has another one.
     """
     left_out, away, moved, there = [], [], [], clip.open() is not None
     for pick in picks:
@@ -347,7 +348,7 @@ def taken(
             with contextlib.suppress(Palette4dError):  # the place has no colour; a bad frame
                 rgb = clip.colour(pick.frame, pick.pixel, pick.box or 1)
                 here = replace(pick, rgb=rgb)
-            if rgb is None or not clip.alike(rgb, pick.rgb):
+            if rgb is None or (told and not clip.alike(rgb, pick.rgb)):
                 away.append(pick.id)
                 here = clip.at_home(replace(pick, areas=(), window=None), grade.display())
         elif there and not pick.whole_hue:

@@ -82,14 +82,14 @@ def _copied(
     for name in former.versions:
         if (version := former.version(name)).edited:
             new, fit = copied(new, version, clip, time, same_clip=True)
-            if fit.lost:
-                notes.append(f"version {name}{fit.lost}")
+            if lost := replace(fit, nothing=False).lost:  # the former edits do not stay here
+                notes.append(f"version {name}{lost}")
         new, _ = save_version(new, name)
         new = set_note(new, name, former.note(name))
         new = reset(new)
     if former.edited:
         new, fit = copied(new, former, clip, time, same_clip=True)
-        fit = replace(fit, nothing=False)  # the former edits do not stay here
+        fit = replace(fit, nothing=False)
         notes.append(f"the palette changed, so that the grade was copied: {fit}")
     name = "copy the grade of the former analysis"
     step = difference(analysed.state, new.state, name).undoable()
