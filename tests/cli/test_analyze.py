@@ -75,8 +75,8 @@ def test_picks_keep_their_places_when_a_clips_colour_space_is_told(
     out = tmp_path / "g.p4d.json"
     analyze = ["analyze", str(tmp_path / "v"), "-o", str(out), "--quiet"]
     assert main.main(analyze) == 0
-    for place, to in (("5,8", "0.02 0.02 0.5"), ("18,8", "0.1 0.14 0.1")):
-        pick = ["pick", "--pixel", place, "--to", *to.split(), "--frame", "2"]
+    for place, to, how in (("5,8", "0.02 0.02 0.5", "--follow"), ("18,8", "0 0.3 0", "--no-follow")):
+        pick = ["pick", "--pixel", place, "--to", *to.split(), "--frame", "2", how]
         assert main.main(["edit", str(out), *pick]) == 0
     capsys.readouterr()
     again = [*analyze, "--keep-edits", "--input-space", "Linear Rec.709 (sRGB)"]
@@ -86,6 +86,7 @@ def test_picks_keep_their_places_when_a_clips_colour_space_is_told(
     assert "picked where" not in said
     kept = Document.load(out).grade.picks
     assert [pick.pixel for pick in kept] == [(5, 8), (18, 8)]
+    assert [bool(pick.path) for pick in kept] == [True, False]  # followed, and not followed
 
 
 def test_the_files_bytes_are_the_same_every_time(clip, tmp_path):

@@ -217,7 +217,9 @@ def copied(
     picks = (_pick(match, pick, frames, same_clip=same_clip) for pick in source.picks)
     spaces = {target.encoding, source.encoding}
     told = len(spaces) == 1 or "unknown" not in spaces  # else no colours can be compared
-    after, left_out, away = taken(after, clip, [p for p in picks if p is not None], told=told)
+    still = {pick.id for pick in source.picks if not pick.path}
+    here = [pick for pick in picks if pick is not None]
+    after, left_out, away = taken(after, clip, here, still, told=told)
     copies = {pick.id: pick for pick in after.picks}
     everywhere = [
         pick.id

@@ -5,7 +5,7 @@ what colours picks take, from a `ClipOfPicks`.
 """
 
 import contextlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from typing import Any, TypedDict, Unpack
 
@@ -331,9 +331,14 @@ def unpick(grade: Grade, clip: ClipOfPicks, *ids: str) -> Grade:
 
 
 def taken(
-    grade: Grade, clip: ClipOfPicks, picks: Iterable[Pick], *, told: bool = True
+    grade: Grade,
+    clip: ClipOfPicks,
+    picks: Iterable[Pick],
+    still: Collection[str] = (),
+    *,
+    told: bool = True,
 ) -> tuple[Grade, list[str], list[str]]:
-    """Take over picks of another palette, learned here.
+    """Take over picks of another palette, learned here, and followed but for those in `still`.
 
     Those with a place in this clip are picked there, if it has nearly their colour, or if it is not
     `told` what colours the other palette's numbers are; of others the colour is looked for. Without
@@ -356,7 +361,8 @@ def taken(
         if here is None:
             left_out.append(f"{pick.id} ({_asked(pick)})")
         else:
-            moved.append(replace(here, path=clip.path(here)) if there else here)
+            follows = there and pick.id not in still
+            moved.append(replace(here, path=clip.path(here)) if follows else here)
     for pick in moved:
         grade = grade.put("pick", pick.id, pick)
     return _with_mattes(grade, clip, moved), left_out, away
