@@ -67,7 +67,7 @@ def test_json_report_and_frames(clip, tmp_path, capsys):
 def test_picks_keep_their_places_when_a_clips_colour_space_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """As the note on scene-linear clips asks; the pixels are the same, only their numbers change."""
+    """As the note on scene-linear clips asks: the pixels are the same, their numbers change."""
     halves = np.where(np.arange(24)[None, :, None] < 12, [0.5, 0.02, 0.02], [0.1, 0.1, 0.12])
     for frame in range(1, 5):
         pixels = (halves * (1 + frame / 100)).repeat(16, 0).astype(np.float32)
@@ -75,7 +75,10 @@ def test_picks_keep_their_places_when_a_clips_colour_space_is_told(
     out = tmp_path / "g.p4d.json"
     analyze = ["analyze", str(tmp_path / "v"), "-o", str(out), "--quiet"]
     assert main.main(analyze) == 0
-    for place, to, how in (("5,8", "0.02 0.02 0.5", "--follow"), ("18,8", "0 0.3 0", "--no-follow")):
+    for place, to, how in (
+        ("5,8", "0.02 0.02 0.5", "--follow"),
+        ("18,8", "0 0.3 0", "--no-follow"),
+    ):
         pick = ["pick", "--pixel", place, "--to", *to.split(), "--frame", "2", how]
         assert main.main(["edit", str(out), *pick]) == 0
     capsys.readouterr()
