@@ -447,6 +447,7 @@ def test_a_new_analysis_keeps_windows(tmp_path: Path, same: bool) -> None:
         8, colour=seen, by=(0.2, 0, 0), follow=False, window=(10, 20, 30, 50)
     ).window
     document.save_version("windowed")
+    document.lock("v1")
     document.save(path)
     fields = members("merge")
     fields["edits"] = {"vertices": [], "stops": []}
@@ -456,6 +457,7 @@ def test_a_new_analysis_keeps_windows(tmp_path: Path, same: bool) -> None:
     new = Document(fields)
     new.save(path, on_edits="keep")
     assert any("the grade was copied" in note for note in new.notes)
+    assert any("1 lock of former handles left out: v1" in note for note in new.notes)
     found = Document.load(path)
     assert found.grade.pick("p1").window == window
     assert found.version("windowed").grade.pick("p1").window == window

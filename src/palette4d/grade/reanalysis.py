@@ -11,6 +11,7 @@ from palette4d.common import sandbox
 from palette4d.common.child import Child
 from palette4d.common.errors import SidecarError
 from palette4d.common.files import link_target, replacing
+from palette4d.common.text import counted, some_of
 from palette4d.grade import sidecar
 from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.copying import copied
@@ -91,6 +92,8 @@ def _copied(
         new, fit = copied(new, former, clip, time, same_clip=True)
         fit = replace(fit, nothing=False)
         notes.append(f"the palette changed, so that the grade was copied: {fit}")
+    if locks := [id_ for kind, id_ in former.state if kind == "lock"]:
+        notes.append(f"{counted(len(locks), 'lock')} of former handles left out: {some_of(locks)}")
     name = "copy the grade of the former analysis"
     step = difference(analysed.state, new.state, name).undoable()
     steps: list[Edit] = [step] if step.changes else []
