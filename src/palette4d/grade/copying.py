@@ -98,7 +98,7 @@ class Fit:
             f"by {self.largest * 255:.1f} at most (99 % of the colours); the grade changes the "
             f"colours by {self.change * 255:.1f}"
             if self.change
-            else "the grade moves no colours of the palette but by its picks"
+            else "at the frames that were compared the grade moves no colours but by its picks"
         )
         if self.foreign >= 0.005:
             text += (
