@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from clip_files import write_image
+from deliveries import render
 
 from palette4d.media.clip import open_clip
 from palette4d.media.dpx_alpha import with_last
@@ -36,3 +37,13 @@ def test_a_file_that_ends_early_is_left_as_it_was_read(tmp_path: Path) -> None:
     for length in (3, 805, 815, len(whole) - 4):
         path.write_bytes(whole[:length])
         assert with_last(stored, path, 10) is stored
+
+
+@pytest.mark.parametrize("width", [1, 4, 64, 65, 4096])
+def test_a_picture_of_any_width_is_written(tmp_path: Path, width: int) -> None:
+    pixels = np.linspace(0.1, 1, 2 * width * 4, dtype=np.float32).reshape(2, width, 4)
+    pixels[..., 3] = 1
+    write_image(tmp_path / "a.0001.exr", pixels)
+    render(tmp_path / "a.0001.exr", tmp_path / "o.####.dpx")
+    again = open_clip(str(tmp_path / "o.0001.dpx"))
+    assert (again.read(1)[..., 3] == 1).all()

@@ -64,6 +64,10 @@ def test_very_many_shots_of_one_name_are_named_at_once() -> None:
     named, _ = shots.numbered(many)
     again, _ = shots.numbered([dataclasses.replace(one, name="A") for one in named], named)
     assert {one.name for one in again} == {one.name for one in named}
+    # A film that was cut from one movie, each shot trimmed since.
+    film, _ = shots.numbered([shot("A", 100 * at, 100 * at + 90) for at in range(3000)])
+    trimmed = [shot("A", 100 * at + 1, 100 * at + 90) for at in range(3000)]
+    assert [one.name for one in shots.numbered(trimmed, film)[0]] == [one.name for one in film]
 
 
 def test_a_movie_is_split_at_its_cut(tmp_path: Path) -> None:

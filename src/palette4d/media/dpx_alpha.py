@@ -20,10 +20,11 @@ _ELEMENT, _FIELDS, _RGBA = 800, "BxxxHHII", 51
 _SHIFTS = {1: 22, 2: 20}
 
 
-def with_last(samples: NDArray[Any], path: Path, bits: int) -> NDArray[Any]:
+def with_last(samples: NDArray[Any], path: Path, bits: int, top: int = 0) -> NDArray[Any]:
     """Return the samples (h, w, c) that were read from a file, with the last alpha of each line.
 
-    `bits` is the depth that the file states. Samples of 10 bits are the upper ones of 16.
+    `bits` is the depth that the file states, and `top` the first line that was read. Samples of 10
+    bits are the upper ones of 16, and repeated below.
     """
     height, width, channels = samples.shape
     if bits != 10 or channels != 4 or width % 3 != 1 or path.suffix.lower() != ".dpx":
@@ -39,12 +40,14 @@ def with_last(samples: NDArray[Any], path: Path, bits: int) -> NDArray[Any]:
         if not stored_so or padding % 4 or padding > 1 << 16:
             return samples
         words = (width * channels + 2) // 3
-        file.seek(offset)
-        lines = np.fromfile(file, order + "u4", height * (words + padding // 4))
-    if lines.size < height * (words + padding // 4):
+        line = words + padding // 4
+        file.seek(offset + 4 * line * top)
+        lines = np.fromfile(file, order + "u4", line * height)
+    if lines.size < line * height:
         return samples
-    last = lines.reshape(height, -1)[:, words - 1]
+    last = lines.reshape(height, line)[:, words - 1]
     first, third = (last >> shift & 0x3FF for shift in (_SHIFTS[packing], _SHIFTS[packing] - 20))
     mended = samples.copy()
-    mended[:, -1, -1] = np.where(first > 0, first, third).astype(np.uint16) << 6
+    alpha = np.where(first > 0, first, third).astype(np.uint16)
+    mended[:, -1, -1] = alpha << 6 | alpha >> 4
     return mended

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.common.errors import Arg, Palette4dError, WriteError
 from palette4d.common.files import EXISTS, replacing
-from palette4d.media import oiio_text
+from palette4d.media import dpx_alpha, oiio_text
 from palette4d.media.clip_base import strips
 from palette4d.media.clip_sequence import Pattern
 from palette4d.media.exr_around import has_every_block
@@ -329,9 +329,12 @@ def _is_whole(path: Path, stored: NDArray[Any]) -> bool:
     height, _, channels = stored.shape
     first = 0 if _format(path.suffix) == "tif" else height - 1
     kind, whole = source.spec().format, True
+    bits = source.spec().get_int_attribute("oiio:BitsPerSample")
     for rows in strips(height - first, stored.shape[1]):
         top, end = first + rows.start, first + rows.stop
         read = source.read_scanlines(0, 0, top, end, 0, 0, channels, kind)
+        if read is not None:
+            read = dpx_alpha.with_last(read, path, bits, top)
         # JPEG is lossy: its decoder reports a file that ends early. NaNs are equal, too.
         whole = read is not None and (
             _format(path.suffix) == "jpg" or read.tobytes() == stored[top:end].tobytes()

@@ -5,6 +5,7 @@ Input: a clip with cuts; for edits see `timeline`. Output: `Shot`s, which `batch
 
 from __future__ import annotations
 
+import bisect
 import dataclasses
 import itertools
 import re
@@ -20,8 +21,7 @@ from palette4d.shows.edl_cdl import Cdl
 
 #: Largest number of colours per frame in the search for cuts.
 BINS = 4096
-#: Former shots of one name above which only the same frames are looked for: each is compared with
-#: each.
+#: The most former shots of one name, of those that share frames, that a shot is compared with.
 MOST_ALIKE = 1000
 #: What `numbered` adds to a name.
 _SUFFIX = re.compile(r"_f-?\d+(_\d+)?$")
@@ -123,16 +123,23 @@ def numbered(
     return out, [now.name for now, shot in zip(out, shots, strict=True) if now.name != shot.name]
 
 
+def _first(shot: Shot) -> int:
+    return shot.used[0]
+
+
 def _kept_names(
     shots: Sequence[Shot], former: Sequence[Shot], clips: Sequence[str]
 ) -> dict[int, str]:
     """Return the former names of shots by their places in the list."""
-    alike: dict[str, list[Shot]] = {}
+    alike: dict[str, list[Shot]] = {}  # by their first frames
     same: dict[tuple[str, str, tuple[int, int]], list[Shot]] = {}
     for shot in reversed(former):
         for own in {shot.name.casefold(), _SUFFIX.sub("", shot.name.casefold())}:
             alike.setdefault(own, []).append(shot)
             same.setdefault((own, shot.clip, shot.used), []).append(shot)
+    for others in alike.values():
+        others.sort(key=_first)
+    longest = max((shot.used[1] - shot.used[0] for shot in former), default=0)
     kept: dict[int, str] = {}
     taken: set[str] = set()
 
@@ -148,7 +155,9 @@ def _kept_names(
     pairs = []
     for i, shot in enumerate(shots):
         others = [] if i in kept else alike.get(shot.name.casefold(), [])
-        for other in others if len(others) <= MOST_ALIKE else []:
+        begin = bisect.bisect_left(others, shot.used[0] - longest, key=_first)
+        end = bisect.bisect_right(others, shot.used[1], key=_first)
+        for other in others[begin : min(end, begin + MOST_ALIKE)]:
             first, last = max(shot.used[0], other.used[0]), min(shot.used[1], other.used[1])
             if first <= last:
                 pairs.append((other.clip != clips[i], first - last, i, other.name))
