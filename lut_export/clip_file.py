@@ -36,8 +36,10 @@ class ClipExport:
     matte_levels : int
         Values that the picks' mattes were reduced to, to have room; 0: they are exact.
     error : float
-        The largest error by that, in the palette's code values: measured against `render`
-        on colours from 0 to 1, 100,000 at each of up to 48 frames. All else is within 1e-4.
+        The largest error by that, in the palette's code values, that was measured on colours from 0
+        to 1, 100,000 at each of up to 48 frames. All else is within 1e-4 of `render --clean-up 0`.
+    has_picks : bool
+        Picks are drawn, without Clean up: the file knows no neighbouring pixels.
     """
 
     output: str
@@ -49,6 +51,7 @@ class ClipExport:
     constant_bytes: int
     matte_levels: int
     error: float
+    has_picks: bool
 
 
 @dataclass(frozen=True)
@@ -129,7 +132,7 @@ def write_clip(
     if clip.levels:
         head += (
             f"// The mattes of picks have {clip.levels} values, to have room: code values are off "
-            f"by up to {clip.error:.2g}.\n"
+            f"by about {clip.error:.2g}.\n"
         )
     files = {output: (head + form(clip, name, dialect.body(clip))).encode("ascii", "replace")}
     texture = output.with_suffix(".rgba")
@@ -150,6 +153,7 @@ def write_clip(
         clip.size,
         clip.levels,
         clip.error,
+        clip.has_picks,
     )
 
 

@@ -40,10 +40,12 @@ class ClipText:
 
     Attributes
     ----------
+    begins : the clip's first frame, also where a range of it is written.
     first, last : the clip's frames that it knows; before and after them the nearest holds.
     keys, pick_keys : times at which the palette is stored, and at which picks and holds are.
     levels : values that the picks' mattes were reduced to; 0: they are exact.
     error : in the palette's code values, what that changes.
+    has_picks : picks or holds ask for something.
     arrays : constants by name; numbers are all float, or all int.
     texture : (h, 256, 4) bytes of the picks' mattes, which the dialect's p4d_word(i) reads; None
         where there are no picks, or where `arrays` have them.
@@ -51,12 +53,14 @@ class ClipText:
     text : the kernel; p4d_at_strength(frame, strength, r, g, b) draws.
     """
 
+    begins: int
     first: int
     last: int
     keys: int
     pick_keys: int
     levels: int
     error: float
+    has_picks: bool
     arrays: dict[str, Numbers]
     texture: NDArray[np.uint8] | None
     defines: str
@@ -163,12 +167,14 @@ def clip_text(
         texts.append(_core.kernel_text("clip_picks"))
     text = "\n".join([*texts, *conversion, _core.kernel_text("clip_main")])
     return ClipText(
+        int(sidecar.clip["first"]),
         int(times[0]),
         int(times[-1]),
         len(keys),
         len(picks.times) if picks is not None else 0,
         levels,
         error,
+        picks is not None,
         arrays,
         texture,
         "\n".join(defines),
@@ -202,7 +208,7 @@ def _picks(
         off = _error(sidecar, levels, times) if levels else 0.0
         if off > max_error:
             raise Palette4dError(
-                f"{output}: found code values off by up to {off:.2g}, since the mattes of picks "
+                f"{output}: found code values off by about {off:.2g}, since the mattes of picks "
                 f"have room for {levels} values only; expected at most {max_error:.2g}: {less}, or "
                 f"accept that ({Arg('max_error', ceil(off * 100) / 100)})"
             )

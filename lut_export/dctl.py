@@ -79,7 +79,7 @@ def export_dctl(
     """
 
     def text(clip: ClipText, _: str, body: str) -> str:
-        return _TEXT.format(offset=clip.first - 1, body=body, **(_WITH_ALPHA if alpha else _PLAIN))
+        return _TEXT.format(offset=clip.begins - 1, body=body, **(_WITH_ALPHA if alpha else _PLAIN))
 
     forms = {".dctl": text}
     return write_clip(source, path, _DCTL, forms, frames=frames, force=force, max_error=max_error)

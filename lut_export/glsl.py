@@ -103,7 +103,7 @@ def _hook(clip: ClipText, name: str, body: str) -> str:
         texture=texture,
         bind="//!BIND p4d_mattes\n" if texture else "",
         name=name,
-        first=clip.first,
+        first=clip.begins,
         body=(_WORD if texture else "") + body,
     )
 

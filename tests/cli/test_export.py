@@ -213,7 +213,7 @@ def test_a_dctl_says_its_error_and_refuses_more(
     assert not (tmp_path / "a.dctl").exists()
     assert main([*map(str, words)]) == 0
     printed = capsys.readouterr()
-    assert "off by up to 0.0" in printed.err
+    assert "off by about 0.0" in printed.err
     assert " of picks, " in printed.out
 
 

@@ -28,8 +28,8 @@ clips name the shot's sidecar and files in their metadata ("palette4d").
 --dctl writes palette, edits and picks through time as one file for DaVinci Resolve, without LUTs;
 --glsl the same as a fragment function (NAME.glsl; with picks a texture NAME.rgba beside it) or as a
 shader for mpv (NAME.hook). A DCTL has room for 64 KB: then mattes of picks get fewer values. If
-code values are off by more than 0.02 of `render`, nothing is written: choose --frames, switch picks
-off, or accept more by --max-error.
+code values are off by more than 0.02, nothing is written: choose --frames, switch picks off, or
+accept more by --max-error. All these files draw what `render --clean-up 0` does.
 
 examples:
   palette4d export shot010.p4d.json --every 1 -o luts
@@ -183,12 +183,14 @@ def _one_file(args: argparse.Namespace) -> int:
             f"{f' and {done.pick_keys} of picks' if done.pick_keys else ''}, "
             f"{done.constant_bytes / 1024:.1f} KB of {MOST_BYTES // 1024} KB"
         )
+        if done.has_picks:
+            print("  picks are drawn without Clean up, as by `render --clean-up 0`")
         if done.texture is not None:
             print(f"{done.texture}: the texture for its picks")
     if done.matte_levels:
         about = (
             f"the mattes of picks have {done.matte_levels} values, to have room: code values are "
-            f"off by up to {done.error:.2g}; fewer picks, or frames, leave more room"
+            f"off by about {done.error:.2g}; fewer picks, or frames, leave more room"
         )
         tell(args, "warning", about)
     return 0

@@ -130,10 +130,9 @@ def _report(args: argparse.Namespace, error: Exception) -> int:
     text = in_words(error).marked
     broken = isinstance(error, SidecarError) and (error.pointer or "JSON" in error.expected)
     if isinstance(error, SidecarError) and '"palette4d.shots"' in error.found:
-        text += (
-            "; this is a manifest of shots: name the sidecar (.p4d.json) of one, or use `palette4d "
-            "export` or `palette4d config`, which take them all"
-        )
+        text += "; this is a manifest of shots: name the sidecar (.p4d.json) of one"
+        if not (vars(args).get("dctl") or vars(args).get("glsl")):
+            text += ", or use `palette4d export` or `palette4d config`, which take them all"
     elif broken and "update palette4d" not in text:
         text += "; correct it there, take an earlier copy of the file, or analyse the clip again"
     tell(args, "error", text)
