@@ -200,6 +200,25 @@ def moving(monkeypatch: pytest.MonkeyPatch, frames: int = 6) -> Document:
     return palette4d.analyze(pixels, vertices=8)
 
 
+def test_a_pick_of_a_still_is_followed_in_a_clip(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a palette of one frame nothing can be followed: that is no wish."""
+    document = moving(monkeypatch)
+    clip = ClipOfPicks.of(document.grade, None).open()
+    assert clip is not None
+    own = document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
+    document.undo()
+    monkeypatch.setattr(
+        "palette4d.grade.clip_of_picks.find_clip", lambda *_: ArrayClip(clip.read(0)[None])
+    )
+    still = palette4d.analyze(clip.read(0)[None], vertices=8)
+    assert not still.pick(0, pixel=(20, 30), box=9, to="#2040b0").path
+    monkeypatch.setattr("palette4d.grade.clip_of_picks.find_clip", lambda *_: clip)
+    document.copy_from(still)
+    (copied,) = document.grade.picks
+    assert copied.path
+    assert own.path
+
+
 BOX = (6.0, 16.0, 34.0, 44.0)
 
 

@@ -142,8 +142,8 @@ def test_a_failed_analysis_offers_the_fields_that_help(opened: Window, qtbot: An
     dialog.reject()
 
 
-#: Arguments that a window does not ask: work on a farm, and files of a whole show.
-NOT_ASKED = {"cluster", "jobs", "edl", "otio", "clip"}
+#: Arguments that a window does not ask: work on a farm, files of a whole show, and of a DCTL.
+NOT_ASKED = {"cluster", "jobs", "edl", "otio", "clip", "max_error"}
 SOURCES = Path(__file__).resolve().parent.parent.parent
 
 

@@ -217,7 +217,9 @@ def copied(
     picks = (_pick(match, pick, frames, same_clip=same_clip) for pick in source.picks)
     spaces = {target.encoding, source.encoding}
     told = len(spaces) == 1 or "unknown" not in spaces  # else no colours can be compared
-    still = {pick.id for pick in source.picks if not pick.path}
+    # In a palette of one frame nothing could be followed.
+    begin, end, _ = source.frames
+    still = {pick.id for pick in source.picks if not pick.path and begin < end}
     here = [pick for pick in picks if pick is not None]
     after, left_out, away = taken(after, clip, here, still, told=told)
     copies = {pick.id: pick for pick in after.picks}
