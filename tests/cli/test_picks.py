@@ -136,6 +136,12 @@ def test_disable_enable_and_change(path: str, run: Run) -> None:
     np.testing.assert_allclose(picks_of(path)[0]["rgb"], (0.7, 0.15, 0.1), atol=0.05)
 
 
+def test_a_pick_that_is_not_to_be_followed_needs_no_clip(path: str, run: Run) -> None:
+    run("pick", *BARN, "--no-follow")
+    assert "was not found" not in run("change", "p1", "--reach", "0.5")[1]
+    assert "follows its colour" in run("change", "p1", "--follow")[1]
+
+
 def test_a_change_can_be_taken_back(path: str, run: Run) -> None:
     run("pick", "--frame", "2", "--pixel", "10,13", "--box", "3", "--by", "0.1,0,0")
     before = picks_of(path)[0]

@@ -202,7 +202,8 @@ def _add_how(parser: argparse.ArgumentParser) -> None:
     add(
         "--follow",
         action=argparse.BooleanOptionalAction,
-        help="whether the colour is followed through the clip (default), or the same at all frames",
+        help="whether the colour, and a window given with it, is followed through the clip "
+        "(default), or the same at all frames",
     )
 
 
@@ -400,6 +401,7 @@ def run_change(args: argparse.Namespace) -> int:
         name: value for name in parts if (value := getattr(args, name)) is not None
     }
     box = _box(args)
+    follows = args.follow or bool(args.follow is None and document.grade.pick(args.id).path)
     with frames_bar("following", hidden=False) as progress:
         if args.pixel is not None:
             changes |= {"pixel": args.pixel, "box": box}
@@ -413,7 +415,7 @@ def run_change(args: argparse.Namespace) -> int:
             args.id, any_value=args.any_value, clip=args.clip, progress=progress, **changes
         )
     document.save()
-    _print_pick(args, document, pick.id, followed=args.follow is not False)
+    _print_pick(args, document, pick.id, followed=follows)
     return 0
 
 
