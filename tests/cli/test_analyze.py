@@ -92,6 +92,32 @@ def test_picks_keep_their_places_when_a_clips_colour_space_is_told(
     assert [bool(pick.path) for pick in kept] == [True, False]  # followed, and not followed
 
 
+@pytest.mark.parametrize("confined", [True, False])
+def test_kept_picks_learn_from_the_analysed_clip_beside_their_sidecar(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, confined: bool
+) -> None:
+    """The sidecar names it relative to its own folder; in the working folder is another clip."""
+    halves = np.where(np.arange(24)[None, :, None] < 12, [200, 40, 40], [90, 90, 95]).repeat(16, 0)
+    for folder, pixels in (("A", 255 - halves), ("B", halves)):
+        for frame in range(1, 5):
+            write_image(tmp_path / folder / f"g.{frame:04d}.png", (pixels + frame).astype(np.uint8))
+    monkeypatch.chdir(tmp_path / "A")
+    out = "../B/g.p4d.json"
+    analyze = ["analyze", "../B/g.####.png", "-o", out, "--quiet"]
+    analyze += [] if confined else ["--sandbox", "off"]
+    assert main.main([*analyze, "--method", "static"]) == 0
+    pick = ["pick", "--pixel", "5,8", "--to", "#3060b0", "--frame", "2"]
+    assert main.main(["edit", out, *pick]) == 0
+    before = Document.load(out)
+    assert before.grade.picks[0].matte is not None
+    assert main.main([*analyze, "--keep-edits"]) == 0
+    after = Document.load(out)
+    (kept,) = after.grade.picks
+    assert kept.matte is not None
+    assert (kept.pixel, kept.rgb) == ((5, 8), before.grade.picks[0].rgb)
+    assert after.grade.mattes[kept.matte] == before.grade.mattes[before.grade.picks[0].matte]
+
+
 def test_the_files_bytes_are_the_same_every_time(clip, tmp_path):
     for name, threads in (("a", "1"), ("b", "4")):
         arguments = [

@@ -77,10 +77,10 @@ class ClipOfPicks:
         self._clip: Clip | None = None
 
     @classmethod
-    def of(cls, grade: Grade, given: Given = None) -> ClipOfPicks:
-        """Return the clip of a grade, or the user's."""
-        own = grade.analysed.conversion
-        clip = cls(grade.members["clip"], None if own is None else own.steps, grade.path, given)
+    def of(cls, grade: Grade, given: Given = None, file: Path | None = None) -> ClipOfPicks:
+        """Return the clip of a grade, which will be in `file`, or the user's."""
+        own, file = grade.analysed.conversion, file or grade.path
+        clip = cls(grade.members["clip"], None if own is None else own.steps, file, given)
         clip.display = grade.display()
         return clip
 

@@ -76,7 +76,7 @@ def _copied(
     core, members = sidecar.decoded(read, str(target))
     former = Grade.of(core, members, target)
     analysed = new = Grade.of(sidecar.validate(fields, str(target)), fields, None)
-    clip, notes = ClipOfPicks.of(new, given), []
+    clip, notes = ClipOfPicks.of(new, given, target), []
     own, other = (grade.members["clip"] for grade in (new, former))
     time = _time(own, other)
     former = former.with_state(_scaled(former.state, _growth(own, other)))
