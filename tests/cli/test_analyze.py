@@ -108,6 +108,8 @@ def test_kept_picks_learn_from_the_analysed_clip_beside_their_sidecar(
     assert main.main([*analyze, "--method", "static"]) == 0
     pick = ["pick", "--pixel", "5,8", "--to", "#3060b0", "--frame", "2"]
     assert main.main(["edit", out, *pick]) == 0
+    again = ["pick", "--pixel", "6,8", "--with", "p1", "--frame", "4"]
+    assert main.main(["edit", out, *again]) == 0
     before = Document.load(out)
     assert before.grade.picks[0].matte is not None
     assert main.main([*analyze, "--keep-edits"]) == 0
@@ -115,6 +117,8 @@ def test_kept_picks_learn_from_the_analysed_clip_beside_their_sidecar(
     (kept,) = after.grade.picks
     assert kept.matte is not None
     assert (kept.pixel, kept.rgb) == ((5, 8), before.grade.picks[0].rgb)
+    assert kept.path == before.grade.picks[0].path
+    assert [key.frame for key in kept.path if key.given and key.frame != 2] == [4]
     assert after.grade.mattes[kept.matte] == before.grade.mattes[before.grade.picks[0].matte]
 
 

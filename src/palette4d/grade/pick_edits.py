@@ -362,7 +362,10 @@ def taken(
             left_out.append(f"{pick.id} ({_asked(pick)})")
         else:
             follows = there and pick.id not in still
-            moved.append(replace(here, path=clip.path(here)) if follows else here)
+            # What the user said of other frames holds where the place does.
+            in_place = pick.pixel is not None and pick.id not in away
+            given = [key for key in pick.path if key.given and in_place]
+            moved.append(replace(here, path=clip.path(here, given)) if follows else here)
     for pick in moved:
         grade = grade.put("pick", pick.id, pick)
     return _with_mattes(grade, clip, moved), left_out, away
