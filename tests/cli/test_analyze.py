@@ -110,11 +110,14 @@ def test_kept_picks_learn_from_the_analysed_clip_beside_their_sidecar(
     assert main.main(["edit", out, *pick]) == 0
     again = ["pick", "--pixel", "6,8", "--with", "p1", "--frame", "4"]
     assert main.main(["edit", out, *again]) == 0
+    alone = ["pick", "--colour", "0.3", "0.3", "0.3", "--to", "#30b060", "--frame", "2"]
+    assert main.main(["edit", out, *alone]) == 0
     before = Document.load(out)
     assert before.grade.picks[0].matte is not None
     assert main.main([*analyze, "--keep-edits"]) == 0
     after = Document.load(out)
-    (kept,) = after.grade.picks
+    kept, by_colour = after.grade.picks
+    assert (by_colour.rgb, by_colour.pixel) == ((0.3, 0.3, 0.3), None)
     assert kept.matte is not None
     assert (kept.pixel, kept.rgb) == ((5, 8), before.grade.picks[0].rgb)
     assert kept.path == before.grade.picks[0].path

@@ -221,7 +221,8 @@ def copied(
     begin, end, _ = source.frames
     still = {pick.id for pick in source.picks if not pick.path and begin < end}
     here = [pick for pick in picks if pick is not None]
-    after, left_out, away = taken(after, clip, here, still, told=told)
+    colours = {pick.id for pick in source.picks if same_clip and pick.pixel is None}
+    after, left_out, away = taken(after, clip, here, still, colours, told=told)
     copies = {pick.id: pick for pick in after.picks}
     everywhere = [
         pick.id

@@ -335,15 +335,17 @@ def taken(
     clip: ClipOfPicks,
     picks: Iterable[Pick],
     still: Collection[str] = (),
+    colours: Collection[str] = (),
     *,
     told: bool = True,
 ) -> tuple[Grade, list[str], list[str]]:
     """Take over picks of another palette, learned here, and followed but for those in `still`.
 
     Those with a place in this clip are picked there, if it has nearly their colour, or if it is not
-    `told` what colours the other palette's numbers are; of others the colour is looked for. Without
-    the clip they take all of their hue, as they cannot be learned. Return also those whose colour
-    is not here, and the ids of those whose place has another one.
+    `told` what colours the other palette's numbers are; of others the colour is looked for, unless
+    they are in `colours`, of a colour alone. Without the clip they take all of their hue, as they
+    cannot be learned. Return also those whose colour is not here, and the ids of those whose place
+    has another one.
     """
     left_out, away, moved, there = [], [], [], clip.open() is not None
     for pick in picks:
@@ -356,7 +358,7 @@ def taken(
             if rgb is None or (told and not clip.alike(rgb, pick.rgb)):
                 away.append(pick.id)
                 here = clip.at_home(replace(pick, areas=(), window=None), grade.display())
-        elif there and not pick.whole_hue:
+        elif there and not pick.whole_hue and pick.id not in colours:
             here = clip.at_home(pick, grade.display())
         if here is None:
             left_out.append(f"{pick.id} ({_asked(pick)})")
