@@ -67,7 +67,7 @@ class Fit:
     everywhere : tuple of str
         The ids of copied picks that have a window in the source: windows are not copied.
     elsewhere : tuple of str
-        The ids of copied picks whose place in the clip has another colour now.
+        The ids of copied picks whose place in the clip has another colour now, or is gone.
     unlearned : tuple of str
         The ids of copied picks that take all of their hue, as there is no clip to learn from.
     nothing : bool
@@ -111,7 +111,7 @@ class Fit:
         """What of the picks is not as it was, for people; "" if nothing."""
         text = ""
         if self.elsewhere:
-            why = "their place has another colour here, or none"
+            why = "their place has another colour here, or their frame is gone"
             text += f"; picked where their colour is, since {why}: {', '.join(self.elsewhere)}"
         if self.left_out:
             why = "nothing connected has the colour here"
@@ -222,6 +222,8 @@ def copied(
     still = {pick.id for pick in source.picks if not pick.path and begin < end}
     here = [pick for pick in picks if pick is not None]
     colours = {pick.id for pick in source.picks if same_clip and pick.pixel is None}
+    # Their frames are not in the target.
+    trimmed = [p.id for p in here if same_clip and p.pixel is None and p.id not in colours]
     after, left_out, away = taken(after, clip, here, still, colours, told=told)
     copies = {pick.id: pick for pick in after.picks}
     everywhere = [
@@ -238,7 +240,7 @@ def copied(
         measured,
         left_out=tuple(left_out),
         everywhere=tuple(everywhere),
-        elsewhere=tuple(id_ for id_ in away if id_ in copies),
+        elsewhere=tuple(id_ for id_ in (*away, *trimmed) if id_ in copies),
         unlearned=tuple(unlearned),
         nothing=bool(left_out) and not after.edited,
     )
