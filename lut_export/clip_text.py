@@ -95,6 +95,8 @@ def clip_text(
     Palette4dError where all takes more than `MOST_BYTES`, or where that takes an error of more than
     `max_error`; `output` is named in it.
     """
+    if not (isinstance(max_error, int | float) and max_error >= 0):
+        raise Palette4dError(f"found the error {max_error!r}, expected 0 or more code values")
     times = _frames(sidecar, frames)
     if windows := dict.fromkeys(id_ for time in times for id_ in sidecar.edits.windows_at(time)):
         ids = ", ".join(windows)

@@ -330,6 +330,9 @@ def test_what_a_dctl_cannot_hold_is_refused(
     document = DOCUMENTS["changes-smooth"]
     with pytest.raises(Palette4dError, match=r"outside the clip"):
         exported(document, tmp_path, frames="12-400")
+    for wrong in (-1, float("nan"), "0.1"):
+        with pytest.raises(Palette4dError, match="expected 0 or more code values"):
+            exported(document, tmp_path, max_error=wrong)
     fields = copy.deepcopy(document)
     ends = {fields["clip"]["frames"][end]: far for end, far in (("first", -1e9), ("last", 1e9))}
     polytope, frames = fields["polytope"], fields["clip"]["frames"]

@@ -92,7 +92,7 @@ class Fit:
 
     def __str__(self) -> str:
         """Return the figures for people, in steps of 8 bits."""
-        text = "" if self.fits else "the copied grade does not fit this clip (undo takes it back): "
+        text = "" if self.fits else "the copied grade does not fit this clip: "
         text += (
             f"the copy differs from the copied grade by {self.mean * 255:.1f} of 255 on average, "
             f"by {self.largest * 255:.1f} at most (99 % of the colours); the grade changes the "

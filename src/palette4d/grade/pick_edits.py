@@ -271,8 +271,8 @@ def change_pick(
         window = changes.get("window", old.window)
         if window is None:
             raise Palette4dError(
-                f"{id} has no window, so that it has no {' and no '.join(of_window)}; expected a "
-                f"box first: `window {id} --frame T --box L,T,R,B`"
+                f"{id} has no window, which {' and '.join(of_window)} is of; expected a box first: "
+                f"`window {id} --frame T --box L,T,R,B`"
             )
         changes["window"] = replace(window, **of_window)
     if changes.get("pixel") is not None and "rgb" not in changes:
