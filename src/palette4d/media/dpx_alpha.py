@@ -46,8 +46,7 @@ def with_last(samples: NDArray[Any], path: Path, bits: int, top: int = 0) -> NDA
     if lines.size < line * height:
         return samples
     last = lines.reshape(height, line)[:, words - 1]
-    first, third = (last >> shift & 0x3FF for shift in (_SHIFTS[packing], _SHIFTS[packing] - 20))
+    alpha = (last >> _SHIFTS[packing] & 0x3FF).astype(np.uint16)
     mended = samples.copy()
-    alpha = np.where(first > 0, first, third).astype(np.uint16)
     mended[:, -1, -1] = alpha << 6 | alpha >> 4
     return mended
