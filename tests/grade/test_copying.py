@@ -2,6 +2,7 @@
 
 import copy
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from palette4d.grade import copying, reanalysis, sidecar
 from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.copying import Fit
 from palette4d.grade.document import Document
-from palette4d.grade.picks import Area, Pick
+from palette4d.grade.picks import Area, PathKey, Pick, Window, WindowKey
 from palette4d.media.array_clip import ArrayClip
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "sidecars"
@@ -346,14 +347,61 @@ def test_marks_and_windows_go_along_with_frame_numbers(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("first", "last", "time"),
-    [(0, 20, "same"), (5, 25, "same"), (10, 40, "same"), (21, 41, "relative"), (1000, 1020, "")],
+    [(0, 20, "same"), (5, 25, "same"), (21, 41, "relative"), (1000, 1020, "relative")],
 )
 def test_clips_with_frame_numbers_in_common_keep_edits_at_them(
     first: int, last: int, time: str
 ) -> None:
-    own = {"source": "v1.mov", "frames": {"first": first, "last": last}}
-    former = {"source": "v1.mov", "frames": {"first": 0, "last": 20}}
-    assert reanalysis._time(own, former) == (time or "relative")
+    former = Document(members("split"))
+    fields = stretched(members("split"), 1, first)
+    assert former.grade.frames[:2] == (0, 20)
+    assert fields["clip"]["frames"]["last"] == last
+    assert reanalysis._time(Document(fields).grade, former.grade) == time
+
+
+def with_colours(fields: dict[str, Any]) -> dict[str, Any]:
+    """As an analysis keeps them: they tell whether clips have the same pictures."""
+    frames = fields["clip"]["frames"]
+    rows = [[0.1, 0.2, 0.3, 0.75], [0.5, 0.4, 0.3, 0.25]]
+    colours = [{"frame": frames[end], "rgbw": rows} for end in ("first", "last")]
+    return {**fields, "colours": colours}
+
+
+@pytest.mark.parametrize("numbers", [0, 7, 1000])
+@pytest.mark.parametrize("by", ["keep", "copy"])
+def test_picks_of_the_same_pictures_stay_as_they_are(tmp_path: Path, by: str, numbers: int) -> None:
+    """Also with other frame numbers, some of which both have: 7 to 27 after 0 to 20."""
+    path = tmp_path / "clip.p4d.json"
+    fields = with_colours(members("split"))
+    keys = (PathKey(4, (0.3, 0.3, 0.4)), PathKey(9, (0.4, 0.4, 0.5), True), PathKey(15, (0, 0, 0)))
+    window = Window(3, (WindowKey(8, (1, 2, 9, 8), True), WindowKey(14, (4, 2, 12, 8))), True)
+    picked = Pick(
+        *("p1", "pick", 8, (0.4, 0.4, 0.5), (0.9, 0.1, 0.1)),
+        **{"start": 3, "until": 12.5, "fade": 2, "fade_out": 1, "path": keys, "window": window},
+        **{"pixel": (5, 6), "box": 3, "areas": (Area(12, ((3, 4),), 2),), "reach": 1},
+    )
+    others = (Pick("p2", "hold", 0, (0.1, 0.2, 0.3)), replace(picked, id="p3", enabled=False))
+    picks = {("pick", pick.id): pick for pick in (picked, *others)}
+    grade = Document(fields).grade.having(picks)
+    former = Document(grade.fields())
+    former.save_version("kept")
+    former.save(path)
+    new = Document(with_colours(stretched(members("split"), 1, numbers)))
+    new.grade.members["polytope"]["vertices"][0]["rgb"][0] += 0.01
+    new = Document(new.grade.members)
+    if by == "keep":
+        new.save(path, on_edits="keep")
+        assert not [note for note in new.notes if "p1" in note]
+        versions = Document.load(path).version("kept").grade.picks
+        assert versions == Document.load(path).grade.picks
+    else:
+        new.copy_from(Document.load(path))
+        new.save(path, on_edits="drop")
+    kept = Document.load(path).grade.picks
+    assert kept == tuple(pick.shifted(numbers) for pick in former.grade.picks)
+    assert kept[0].window is not None
+    assert (kept[0].start, kept[0].path[1].frame) == (3 + numbers, 9 + numbers)
+    assert (kept[0].window.keys[1].frame, kept[0].areas[0].frame) == (14 + numbers, 12 + numbers)
 
 
 def test_the_same_frames_need_frames_in_common() -> None:
@@ -433,7 +481,7 @@ def test_a_window_stays_with_its_clip() -> None:
     target = Document(stretched(members("split"), 2, 100))
     fit = target.copy_from(source)
     assert [pick.window for pick in target.grade.picks] == [None, None]
-    assert fit.everywhere == ("p1",)
+    assert fit.lost.everywhere == ("p1",)
     assert str(fit).endswith("without a window, since that is a place in the other clip: p1")
 
 

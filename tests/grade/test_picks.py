@@ -11,7 +11,7 @@ from grade.test_answer import document_of
 
 import palette4d
 from palette4d.common.errors import Palette4dError, SidecarError
-from palette4d.grade import later, mattes, pick_edits, rendering, sidecar
+from palette4d.grade import copying, later, mattes, pick_edits, rendering, sidecar
 from palette4d.grade.clip_colours import ClipColours
 from palette4d.grade.clip_of_picks import ClipOfPicks, largest_part
 from palette4d.grade.document import Document
@@ -178,10 +178,12 @@ def test_another_pixel_without_a_box_is_that_pixel(monkeypatch: pytest.MonkeyPat
     assert (pick.box, pick.rgb) == (1, pytest.approx((0.8, 0.3, 0.2), abs=0.04))
     # Another palette takes the pick over with its box.
     pick = document.change_pick("p1", pixel=(20, 10), box=5)
-    other = replace(pick, rgb=(0, 0, 0), path=())
-    grade, *_ = pick_edits.taken(document.grade, ClipOfPicks.of(document.grade), [other])
+    source = document.grade.put("pick", "p1", replace(pick, rgb=(0.41, 0.4, 0.4)))
+    source = replace(source, members={**source.members, "colours": []})  # of other pictures
+    empty = document.grade.put("pick", "p1", None)
+    grade, _ = copying.copied(empty, source, ClipOfPicks.of(empty), same_clip=True)
     taken = grade.pick("p1")
-    assert (taken.rgb, taken.path) == (pick.rgb, pick.path)
+    assert (taken.rgb, taken.path, taken.box) == (pick.rgb, pick.path, 5)
     assert taken.rgb == pytest.approx((0.4, 0.4, 0.4), abs=0.04)
 
 

@@ -1,39 +1,30 @@
 """Copied grades: another palette gets the look of a graded palette.
 
 Each handle of the target gets the colour that the source's grade makes of its colour at the
-corresponding time. Stops are added where the change along an edge is not linear. Picks are learned
-again from the target's clip: there their colour is, connected, or they are not copied.
+corresponding time. Stops are added where the change along an edge is not linear.
 """
 
-import itertools
-import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from palette4d import _core
-from palette4d.colour.encoding_conversion import between
 from palette4d.common.arguments import frames_between
-from palette4d.common.errors import Arg, Palette4dError
+from palette4d.common.errors import Palette4dError
 from palette4d.common.files import same_file
 from palette4d.grade import recolouring
 from palette4d.grade.clip_colours import ClipColours
 from palette4d.grade.clip_of_picks import ClipOfPicks
-from palette4d.grade.edits import VISIBLE, Colour, Key, Kind, Setting, as_colour, new_id
+from palette4d.grade.copied_picks import NONE_LOST, Lost, with_picks
+from palette4d.grade.correspondence import Match, Time, matched
+from palette4d.grade.edits import VISIBLE, Key, Kind, Setting, as_colour, new_id
 from palette4d.grade.grade import Grade
 from palette4d.grade.keyframes import needed
-from palette4d.grade.pick_edits import taken
-from palette4d.grade.picks import Pick
 from palette4d.grade.versions import with_active_kept
-from palette4d.media.source_clip import nearest
 
 F64 = NDArray[np.float64]
-Time = Literal["relative", "same"] | float
-Convert = Callable[[F64], F64]
 
 #: The edits that the handles' grade is made of.
 HANDLES: tuple[Kind, ...] = ("handle", "ramp")
@@ -44,8 +35,6 @@ NEAR = 0.05
 #: Largest differences of a copy that fits, as shares of the grade's mean change: the second
 #: while the difference is below a step of 8 bits. A tenth of such a step is rounding.
 FITS, FITS_BELOW_A_STEP, ROUNDING = 0.3, 0.5, 0.1 / 255
-#: Times between two handles at which a smooth ramp is looked at.
-ON_SMOOTH = 7
 
 
 @dataclass(frozen=True)
@@ -62,14 +51,8 @@ class Fit:
     foreign : float
         The share of the colours, 0..1, that are farther than `NEAR` from the source's palette:
         there the source's grade says little.
-    left_out : tuple of str
-        The picks whose colour is not in the target's clip, with what they are, for people.
-    everywhere : tuple of str
-        The ids of copied picks that have a window in the source: windows are not copied.
-    elsewhere : tuple of str
-        The ids of copied picks whose place in the clip has another colour now, or is gone.
-    unlearned : tuple of str
-        The ids of copied picks that take all of their hue, as there is no clip to learn from.
+    lost : Lost
+        What of the picks is not as it was.
     nothing : bool
         All of the grade are picks that are left out: nothing is copied.
     """
@@ -78,10 +61,7 @@ class Fit:
     mean: float
     largest: float
     foreign: float
-    left_out: tuple[str, ...] = ()
-    everywhere: tuple[str, ...] = ()
-    elsewhere: tuple[str, ...] = ()
-    unlearned: tuple[str, ...] = ()
+    lost: Lost = NONE_LOST
     nothing: bool = False
 
     @property
@@ -104,87 +84,7 @@ class Fit:
             text += (
                 f"; {self.foreign:.0%} of the clip's colours are not in the other clip's palette"
             )
-        return text + self.lost
-
-    @property
-    def lost(self) -> str:
-        """What of the picks is not as it was, for people; "" if nothing."""
-        text = ""
-        if self.elsewhere:
-            why = "their place has another colour here, or their frame is gone"
-            text += f"; picked where their colour is, since {why}: {', '.join(self.elsewhere)}"
-        if self.left_out:
-            why = "nothing connected has the colour here"
-            text += f"; not copied, since {why}: {', '.join(self.left_out)}"
-            text += "; the edits stay" * self.nothing
-        if self.everywhere:
-            why = "that is a place in the other clip"
-            text += f"; without a window, since {why}: {', '.join(self.everywhere)}"
-        if self.unlearned:
-            why = "the clip was not found"
-            text += f"; of all colours of their hue, since {why}: {', '.join(self.unlearned)}"
-        return text
-
-
-@dataclass(frozen=True)
-class Match:
-    """The times and the colours of two grades."""
-
-    target: Grade
-    source: Grade
-    time: Time
-
-    def there(self, frame: float) -> float:
-        """Return the source's time for a time of the target."""
-        if not isinstance(self.time, str):
-            return float(self.time)
-        first, last, _ = self.target.frames
-        begin, end, _ = self.source.frames
-        if self.time == "same":
-            return min(max(frame, begin), end)
-        return begin + (frame - first) * (end - begin) / max(last - first, 1)
-
-    def back(self, frame: float) -> float:
-        """Return the target's time for a time of the source, unless `time` is a frame."""
-        if self.time == "same":
-            return frame
-        first, last, _ = self.target.frames
-        begin, end, _ = self.source.frames
-        return first + (frame - begin) * (last - first) / max(end - begin, 1)
-
-    @cached_property
-    def conversions(self) -> tuple[Convert | None, Convert | None]:
-        """From the target's code values to the source's, and back; None where they are equal."""
-        clips = (grade.members["clip"] for grade in (self.target, self.source))
-        configs = [name for clip in clips if (name := clip.get("conversion", {}).get("config"))]
-        own, other = self.target.encoding, self.source.encoding
-        return between(own, other, configs), between(other, own, configs)
-
-    @property
-    def knots(self) -> list[float]:
-        """The target's times that show all of the source's ramps.
-
-        They may lie between frames that were analysed: those of vertices and stops, between which
-        the source goes along lines; the last frame before each, where a step ends; and some on
-        smooth ramps.
-        """
-        if not isinstance(self.time, str):
-            return []
-        stops = [stop.frame for stop in self.source.settings.values() if stop.frame is not None]
-        own = {vertex["frame"] for vertex in self.source.members["polytope"]["vertices"]}
-        times = sorted(map(self.back, own.union(stops)))
-        frames = [float(math.ceil(time)) for time in times]
-        smooth = {self.source.ramp, *(set_.ramp for set_ in self.source.settings.values())}
-        between = [np.linspace(*pair, ON_SMOOTH + 2) for pair in itertools.pairwise(times)]
-        curved = np.concatenate([[], *between]).tolist() if "smooth" in smooth else []
-        first, last, _ = self.target.frames
-        wanted = {*times, *frames, *(frame - 1 for frame in frames), *curved}
-        return [time for time in wanted if first <= time <= last]
-
-    @property
-    def pace(self) -> float:
-        """Frames of the target for one frame of the source."""
-        return self.back(1.0) - self.back(0.0)
+        return f"{text}{self.lost}{'; the edits stay' * self.nothing}"
 
 
 def copied(
@@ -206,50 +106,19 @@ def copied(
         )
     if not source.edited:
         raise Palette4dError(f"{source.name} has no edits; expected a graded palette to copy from")
-    match = _match(target, source, time)
+    match = matched(target, source, time)
     state = dict(_handles(match, _grade(match, source.only(*HANDLES))))
     kept, _ = with_active_kept(target, "before copy")
     after = kept.with_state({**kept.of_kind("version", "note", "lock"), **state})
-    first, last, step = target.frames
-    opened = clip.open()
-    there = None if opened is None else [n for n in opened.frames if first <= n <= last]
-    frames = there or range(first, last + 1, step)
-    picks = (_pick(match, pick, frames, same_clip=same_clip) for pick in source.picks)
-    spaces = {target.encoding, source.encoding}
-    told = len(spaces) == 1 or "unknown" not in spaces  # else no colours can be compared
-    # In a palette of one frame nothing could be followed.
-    begin, end, _ = source.frames
-    still = {pick.id for pick in source.picks if not pick.path and begin < end}
-    here = [pick for pick in picks if pick is not None]
-    colours = {pick.id for pick in source.picks if same_clip and pick.pixel is None}
-    # Their frames are not in the target.
-    trimmed = [p.id for p in here if same_clip and p.pixel is None and p.id not in colours]
-    after, left_out, away = taken(after, clip, here, still, colours, told=told)
-    copies = {pick.id: pick for pick in after.picks}
-    everywhere = [
-        pick.id
-        for pick in source.picks
-        if pick.window and pick.id in copies and not copies[pick.id].window
-    ]
-    unlearned = [
-        pick.id for pick in source.picks if pick.matte and pick.id in copies and opened is None
-    ]
+    after, lost = with_picks(after, match, clip, same_clip=same_clip)
     label = f"copy the grade of {source.members['clip']['name']}"
-    measured = fit(after, source, time)
-    whole = replace(
-        measured,
-        left_out=tuple(left_out),
-        everywhere=tuple(everywhere),
-        elsewhere=tuple(id_ for id_ in (*away, *trimmed) if id_ in copies),
-        unlearned=tuple(unlearned),
-        nothing=bool(left_out) and not after.edited,
-    )
-    return after.labelled(label), whole
+    nothing = bool(lost.left_out) and not after.edited
+    return after.labelled(label), replace(fit(after, source, time), lost=lost, nothing=nothing)
 
 
 def fit(target: Grade, source: Grade, time: Time = "relative") -> Fit:
     """Measure how near the handles' grade is to that of another palette on its colours."""
-    match = _match(target, source, time)
+    match = matched(target, source, time)
     target, source = target.only(*HANDLES), source.only(*HANDLES)
     graded = _grade(match, source)
     into, _ = match.conversions
@@ -268,20 +137,6 @@ def fit(target: Grade, source: Grade, time: Time = "relative") -> Fit:
     worst = off[order][min(int(np.searchsorted(reached, 0.99)), len(off) - 1)]
     mean = [float(np.average(values, weights=weight)) for values in (change, off, foreign)]
     return Fit(mean[0], mean[1], float(worst), mean[2])
-
-
-def _match(target: Grade, source: Grade, time: Time) -> Match:
-    if not isinstance(time, str):
-        source.check_frame(time)
-    elif time not in ("relative", "same"):
-        raise Palette4dError(f"found the time {time!r}, expected 'relative', 'same' or a frame")
-    (first, last, _), (begin, end, _) = target.frames, source.frames
-    if time == "same" and not (first <= end and begin <= last):
-        raise Palette4dError(
-            f"found the frames {first} to {last} here and {begin} to {end} in {source.name}, "
-            f"expected frames in common; leave out {Arg('time', 'same')}"
-        )
-    return Match(target, source, time)
 
 
 def _recoloured(grade: Grade, colours: F64, frame: float) -> F64:
@@ -338,71 +193,6 @@ def _handles(match: Match, graded: Callable[[F64, float], F64]) -> Iterator[tupl
             id_ = new_id("s", taken)
             taken.add(id_)
             yield ("handle", id_), Setting(as_colour(new.tolist()), edge["id"], frame)
-
-
-def _pick(match: Match, pick: Pick, frames: Sequence[int], *, same_clip: bool) -> Pick | None:
-    """Return a pick as it is in the target, or None if it does nothing at the chosen frame.
-
-    `frames` are those of the target's clip.
-    """
-    _, into = match.conversions
-
-    def colour(rgb: ArrayLike) -> Colour:
-        own = np.array(rgb, float)
-        return as_colour((own if into is None else into(own)).tolist())
-
-    def time(frame: float) -> int:
-        return nearest(frames, round(match.back(frame)))
-
-    def end(frame: float | None) -> float | None:
-        if frame is None or match.time == "same":
-            return frame
-        return float(round(match.back(frame)))
-
-    always: dict[str, Any] = {"start": None, "until": None, "fade": 0.0, "fade_out": None}
-    copy = replace(pick, path=(), matte=None, **always)
-    if not same_clip:
-        copy = replace(copy, pixel=None, box=None, areas=(), window=None)
-    if pick.to is not None:
-        copy = replace(copy, to=colour(pick.to))
-
-    def picked_at(moment: float) -> Pick:
-        rgb = pick.colour_at(moment)
-        if pick.to is not None and pick.toward == "shift":
-            return replace(copy, rgb=colour(rgb), to=colour(rgb + pick.change_at(moment)))
-        return replace(copy, rgb=colour(rgb))
-
-    if isinstance(match.time, str):
-        first, last, _ = match.target.frames
-        keys = {time(k.frame): k for k in pick.path if first <= match.back(k.frame) <= last}
-        frame = time(pick.frame)
-        if first <= match.back(pick.frame) <= last:
-            copy = replace(copy, rgb=colour(pick.rgb))
-        else:  # it was picked at a frame that is not in the target
-            copy = replace(picked_at(match.there(frame)), pixel=None, box=None)
-        inside = [area for area in copy.areas if first <= match.back(area.frame) <= last]
-        window = copy.window
-        if window is not None:
-            boxes = {round(match.back(key.frame)): key for key in window.keys}
-            window = replace(
-                window, keys=tuple(replace(boxes[f], frame=float(f)) for f in sorted(boxes))
-            )
-        return replace(
-            copy,
-            frame=frame,
-            areas=tuple(replace(area, frame=time(area.frame)) for area in inside),
-            window=window,
-            start=end(pick.start),
-            until=end(pick.until),
-            fade=pick.fade * match.pace,
-            fade_out=None if pick.fade_out is None else pick.fade_out * match.pace,
-            path=tuple(replace(keys[f], frame=f, rgb=colour(keys[f].rgb)) for f in sorted(keys)),
-        )
-    moment = float(match.time)
-    start, until = (moment if end is None else end for end in (pick.start, pick.until))
-    if not start <= moment <= until:
-        return None
-    return replace(picked_at(moment), frame=match.target.frames[0])
 
 
 def _colours(target: Grade) -> Iterator[tuple[float, F64, F64]]:

@@ -28,6 +28,7 @@ from palette4d.grade import (
     versions,
 )
 from palette4d.grade.clip_of_picks import ClipOfPicks
+from palette4d.grade.correspondence import Time
 from palette4d.grade.edits import Edit
 from palette4d.grade.follow import Progress
 from palette4d.grade.grade import Grade
@@ -499,7 +500,7 @@ class Document:
         self,
         source: "Document",
         *,
-        time: copying.Time = "relative",
+        time: Time = "relative",
         clip: PathLike | None = None,
     ) -> copying.Fit:
         """Take over the grade of another document, as one step.

@@ -4,8 +4,7 @@ Each function takes a grade and arguments, and returns the grade after the edit.
 what colours picks take, from a `ClipOfPicks`.
 """
 
-import contextlib
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, TypedDict, Unpack
 
@@ -327,50 +326,7 @@ def unpick(grade: Grade, clip: ClipOfPicks, *ids: str) -> Grade:
     removed = [grade.pick(id_) for id_ in ids]
     keys: list[Key] = [("pick", id_) for id_ in ids]
     grade = grade.having(dict.fromkeys(keys))
-    return _with_mattes(grade, clip, removed).labelled(f"remove {' '.join(ids)}")
-
-
-def taken(
-    grade: Grade,
-    clip: ClipOfPicks,
-    picks: Iterable[Pick],
-    still: Collection[str] = (),
-    colours: Collection[str] = (),
-    *,
-    told: bool = True,
-) -> tuple[Grade, list[str], list[str]]:
-    """Take over picks of another palette, learned here, and followed but for those in `still`.
-
-    Those with a place in this clip are picked there, if it has nearly their colour, or if it is not
-    `told` what colours the other palette's numbers are; of others the colour is looked for, unless
-    they are in `colours`, of a colour alone. Without the clip they take all of their hue, as they
-    cannot be learned. Return also those whose colour is not here, and the ids of those whose place
-    has another one.
-    """
-    left_out, away, moved, there = [], [], [], clip.open() is not None
-    for pick in picks:
-        here: Pick | None = pick
-        if there and pick.pixel is not None:
-            rgb = None
-            with contextlib.suppress(Palette4dError):  # the place has no colour; a bad frame
-                rgb = clip.colour(pick.frame, pick.pixel, pick.box or 1)
-                here = replace(pick, rgb=rgb)
-            if rgb is None or (told and not clip.alike(rgb, pick.rgb)):
-                away.append(pick.id)
-                here = clip.at_home(replace(pick, areas=(), window=None), grade.display())
-        elif there and not pick.whole_hue and pick.id not in colours:
-            here = clip.at_home(pick, grade.display())
-        if here is None:
-            left_out.append(f"{pick.id} ({_asked(pick)})")
-        else:
-            follows = there and pick.id not in still
-            # What the user said of other frames holds where the place does.
-            in_place = pick.pixel is not None and pick.id not in away
-            given = [key for key in pick.path if key.given and in_place]
-            moved.append(replace(here, path=clip.path(here, given)) if follows else here)
-    for pick in moved:
-        grade = grade.put("pick", pick.id, pick)
-    return _with_mattes(grade, clip, moved), left_out, away
+    return with_mattes(grade, clip, removed).labelled(f"remove {' '.join(ids)}")
 
 
 def warnings(grade: Grade, clip: ClipOfPicks, id: str) -> tuple[str, ...]:
@@ -430,7 +386,7 @@ def _add(
             off = "" if other.enabled else f", disabled: `enable {other.id}`"
             raise Palette4dError(f"{other.id} is this {made.kind} already{off}; nothing was added")
     made = replace(made, id=new_id("p", [other.id for other in grade.picks]))
-    grade = _learned(grade, clip, made, f"{made.kind} {made.id}: {_asked(made)}")
+    grade = _learned(grade, clip, made, f"{made.kind} {made.id}: {asked_text(made)}")
     return grade, grade.pick(made.id)
 
 
@@ -442,10 +398,10 @@ def _learned(grade: Grade, clip: ClipOfPicks, pick: Pick, label: str) -> Grade:
             f"found {areas} areas of picks and holds, expected at most {MOST_AREAS}; remove some "
             "picks (`unpick`), and pick again with fewer"
         )
-    return _with_mattes(grade, clip, [pick]).labelled(label)
+    return with_mattes(grade, clip, [pick]).labelled(label)
 
 
-def _with_mattes(grade: Grade, clip: ClipOfPicks, changed: Sequence[Pick]) -> Grade:
+def with_mattes(grade: Grade, clip: ClipOfPicks, changed: Sequence[Pick]) -> Grade:
     """Learn the mattes of changed picks or holds that are still there, and of the other kind.
 
     Picks are background for holds, and holds for picks. A colour that both have is whose it more
@@ -501,7 +457,7 @@ def _changed(old: Pick, new: Pick) -> str:
         for pick in (old, new)
     ]
     changes = [after for before, after in zip(*texts, strict=True) if before != after]
-    return ", ".join(changes) or _asked(new)
+    return ", ".join(changes) or asked_text(new)
 
 
 def _window_text(pick: Pick, frame: float | None = None) -> str:
@@ -520,7 +476,7 @@ def _with_one_fade(pick: Pick) -> Pick:
     return replace(pick, fade_out=None) if pick.fade_out == pick.fade else pick
 
 
-def _asked(pick: Pick) -> str:
+def asked_text(pick: Pick) -> str:
     """Return what a pick asks for, for people: "#5ca832 to #803020 at frame 30"."""
     text = hex_of(pick.rgb)
     if pick.to is not None:

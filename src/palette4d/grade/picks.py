@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,9 @@ _WHOLE = {
     *("frame", "start", "until", "fade", "fade_out"),
     *("pixel", "points", "radius", "feather", "box"),
 }
+
+
+At = TypeVar("At", "PathKey", "Area", "WindowKey")
 
 
 @dataclass(frozen=True)
@@ -259,6 +262,22 @@ class Pick:
                 for area in self.areas
             ),
             window=window,
+        )
+
+    def shifted(self, by: float) -> Pick:
+        """Return the pick for a clip whose frame numbers are higher by so much."""
+
+        def moved(things: tuple[At, ...]) -> tuple[At, ...]:
+            return tuple(dataclasses.replace(each, frame=each.frame + by) for each in things)
+
+        return dataclasses.replace(
+            self,
+            frame=self.frame + by,
+            start=None if self.start is None else self.start + by,
+            until=None if self.until is None else self.until + by,
+            path=moved(self.path),
+            areas=moved(self.areas),
+            window=self.window and dataclasses.replace(self.window, keys=moved(self.window.keys)),
         )
 
     def colour_at(self, frame: float) -> F64:

@@ -15,6 +15,7 @@ from palette4d.common.text import counted, some_of
 from palette4d.grade import sidecar
 from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.copying import copied
+from palette4d.grade.correspondence import same_pictures
 from palette4d.grade.edits import Edit, Key, Kind, State, difference
 from palette4d.grade.grade import Grade
 from palette4d.grade.handle_edits import reset
@@ -78,19 +79,19 @@ def _copied(
     analysed = new = Grade.of(sidecar.validate(fields, str(target)), fields, None)
     clip, notes = ClipOfPicks.of(new, given, target), []
     own, other = (grade.members["clip"] for grade in (new, former))
-    time = _time(own, other)
+    time = _time(new, former)
     former = former.with_state(_scaled(former.state, _growth(own, other)))
     for name in former.versions:
         if (version := former.version(name)).edited:
             new, fit = copied(new, version, clip, time, same_clip=True)
-            if lost := replace(fit, nothing=False).lost:  # the former edits do not stay here
+            if lost := str(fit.lost):
                 notes.append(f"version {name}{lost}")
         new, _ = save_version(new, name)
         new = set_note(new, name, former.note(name))
         new = reset(new)
     if former.edited:
         new, fit = copied(new, former, clip, time, same_clip=True)
-        fit = replace(fit, nothing=False)
+        fit = replace(fit, nothing=False)  # the former edits do not stay here
         notes.append(f"the palette changed, so that the grade was copied: {fit}")
     if locks := [id_ for kind, id_ in former.state if kind == "lock"]:
         notes.append(f"{counted(len(locks), 'lock')} of former handles left out: {some_of(locks)}")
@@ -100,15 +101,15 @@ def _copied(
     return new.fields(steps), notes
 
 
-def _time(own: Fields, other: Fields) -> Literal["relative", "same"]:
+def _time(new: Grade, former: Grade) -> Literal["relative", "same"]:
     """Return how the frames of a new analysis correspond to the former ones.
 
-    Clips that have numbers in common have these frames in common.
+    Clips that have numbers in common have these frames in common, unless the pictures tell that
+    they are numbered anew.
     """
-    (first, last), (begin, end) = (
-        (clip["frames"]["first"], clip["frames"]["last"]) for clip in (own, other)
-    )
-    return "same" if first <= end and begin <= last else "relative"
+    (first, last, _), (begin, end, _) = new.frames, former.frames
+    common = first <= end and begin <= last
+    return "same" if common and not same_pictures(new, former) else "relative"
 
 
 def _with_same_handles(old: Grade, new: Grade, by: tuple[float, float]) -> Grade | None:
