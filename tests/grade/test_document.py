@@ -194,10 +194,12 @@ def test_a_frame_step_is_that_of_the_clip(tmp_path: Path) -> None:
     assert document.grade.near(wanted, frame=first + 2).handle is None
 
 
-@pytest.mark.parametrize("frame", [0, 3, 4.5, 9, 9.25, 15])
+@pytest.mark.parametrize("frame", [0, 3, 4.5, 9, 9.25, 14.6, 15])
 @pytest.mark.parametrize("name", ["split", "edited"])
-def test_the_new_colour_is_hit_exactly(tmp_path: Path, name: str, frame: float) -> None:
+@pytest.mark.parametrize("ramp", ["linear", "smooth", "step"])
+def test_the_new_colour_is_hit_exactly(tmp_path: Path, name: str, frame: float, ramp: str) -> None:
     document = Document.load(copy_of(name, tmp_path))
+    document.set_ramp(ramp)
     for i in range(len(document.grade.palette(frame).ids)):
         seen = document.grade.palette(frame).edited[i]
         found = document.set_near(seen, frame=frame, rgb=(-2.0 - i, 0.25, 0.5))

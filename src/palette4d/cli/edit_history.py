@@ -32,7 +32,8 @@ def add_actions(action: Action) -> None:
     history = action(
         "history",
         "[--json | --clear]",
-        "list the steps that undo and redo know, oldest first. The sidecar keeps the last 200.",
+        "list the steps that undo and redo know, oldest first. The sidecar keeps the last 200, "
+        "up to 256 KB.",
     )
     either = history.add_mutually_exclusive_group()
     either.add_argument("--json", action="store_true", help="print JSON")

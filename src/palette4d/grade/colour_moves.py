@@ -166,7 +166,7 @@ def moved(
             times |= {within.start, within.end}  # the neighbour stays outside of the range
         if not times:
             continue
-        knots = knots_of(handles, settings, edge)
+        knots = _knots_of(handles, settings, edge)
         for frame in sorted(times):
             if not knots[0][0] < frame < knots[-1][0] or any(at == frame for at, _ in knots):
                 continue
@@ -182,7 +182,7 @@ def moved(
     return result
 
 
-def knots_of(
+def _knots_of(
     handles: Handles, settings: Mapping[str, Setting], edge: str
 ) -> list[tuple[float, Ramp | None]]:
     """Return the times of an edge's handles in order, with their own ramps."""

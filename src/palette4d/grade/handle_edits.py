@@ -106,32 +106,31 @@ def set_near(
         return after, replace(nearest, handle=None)
     move, _ = _move(grade, nearest.id, frame, how)
     new = as_colour(move(nearest.rgb))
-    handle, moved = nearest.handle, new
+    handle, moved, ramp = nearest.handle, new, how.get("ramp")
     if handle in grade.handles.vertices and handle != nearest.id:
-        share = _share(grade, handle, nearest.id, frame)
+        ramped = grade if ramp is None else set_ramp(grade, ramp, handle)
+        share = _share(ramped, handle, nearest.id, frame)
         if share < LEAST_SHARE:
             handle = None
         else:
-            own = grade.colour(handle)
-            moved = as_colour(
-                [o + (n - f) / share for o, n, f in zip(own, new, nearest.rgb, strict=True)]
-            )
+            own, now = ramped.colour(handle), ramped.colour_on_edge(nearest.id, frame)
+            moved = as_colour([o + (n - f) / share for o, n, f in zip(own, new, now, strict=True)])
     label = f"set {handle or nearest.id} at frame {frame:g} to {text_of(new)}"
     if handle is not None:
         grade = set_colour(grade, handle, moved)
     else:
         grade, handle = stop(grade, nearest.id, frame, new)
-    if (ramp := how.get("ramp")) is not None:
+    if ramp is not None:
         grade = set_ramp(grade, ramp, handle)
     return grade.labelled(label), replace(nearest, handle=handle)
 
 
 def _share(grade: Grade, vertex: str, edge: str, frame: float) -> float:
     """Return the weight, 0..1, of an end of an edge in the edge's displacement at a frame."""
-    own: float = grade.handles.vertex(vertex)["frame"]
-    knots = colour_moves.knots_of(grade.handles, grade.settings, edge)
-    nearest = min(abs(knot - own) for knot, _ in knots if knot != own)
-    return max(0.0, 1 - abs(frame - own) / nearest)
+    red, *others = grade.colour(vertex)
+    step = 1 if red < 0 else -1  # stays within what colours may be
+    further = set_colour(grade, vertex, as_colour([red + step, *others]))
+    return (further.colour_on_edge(edge, frame)[0] - grade.colour_on_edge(edge, frame)[0]) / step
 
 
 def move(grade: Grade, stop: str, frame: float) -> Grade:
