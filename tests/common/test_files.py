@@ -112,12 +112,21 @@ def test_file_and_folder_are_synced(old: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 @modes
-@pytest.mark.parametrize("mode", [0o640, 0o600, 0o444])
+@pytest.mark.parametrize("mode", [0o640, 0o600, 0o200])
 def test_permissions_are_kept(old: Path, mode: int) -> None:
     old.chmod(mode)
     with replacing(old, force=True) as temporary:
         temporary.write_bytes(b"new")
     assert stat.S_IMODE(old.stat().st_mode) == mode
+
+
+@modes
+def test_a_read_only_file_stays(old: Path) -> None:
+    """As Perforce leaves files that nobody checked out."""
+    old.chmod(0o444)
+    with pytest.raises(WriteError, match=r"read-only .*chmod u\+w"), replacing(old, force=True):
+        pass
+    assert old.read_bytes() == b"old"
 
 
 FOR_ONE = for_one(6, 4)

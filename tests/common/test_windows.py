@@ -9,7 +9,6 @@ import time
 from pathlib import Path
 
 import pytest
-from wine import WINE
 
 import palette4d
 from palette4d.common.errors import Palette4dError, WriteError
@@ -52,7 +51,6 @@ def test_a_file_that_stays_open_is_named_and_kept(old: Path) -> None:
     assert [path.name for path in old.parent.iterdir()] == [old.name]
 
 
-@pytest.mark.skipif(WINE, reason="Wine replaces read-only files")
 def test_a_read_only_file_is_named_as_such(old: Path) -> None:
     old.chmod(0o444)
     with pytest.raises(WriteError, match="attrib -r"):

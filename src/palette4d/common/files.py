@@ -71,6 +71,13 @@ def refuse_existing(
             f"{path}: found a file of {path.stat().st_nlink} names (hard links), which would part "
             "from the others; expected a file of its own. Write to another name, or make it a copy"
         )
+    if path.exists() and not (path.stat().st_mode & 0o222 and os.access(path, os.W_OK)):
+        # A rename would replace it, whatever its owner meant; root may write any file.
+        change = "attrib -r" if sys.platform == "win32" else "chmod u+w"
+        raise WriteError(
+            f"{path}: found a read-only file, expected one that you may write; make it so "
+            f"({change}), or choose another name"
+        )
     if not os.access(path.parent, os.W_OK):
         raise closed(path)
 
@@ -324,11 +331,6 @@ def _rename(temporary: Path, path: Path) -> None:
                 temporary.replace(path)
                 return
             except PermissionError as error:
-                if path.exists() and not os.access(path, os.W_OK):
-                    raise WriteError(
-                        f"{path}: found a read-only file, which Windows does not replace; "
-                        f'run attrib -r "{path}", or choose another name'
-                    ) from error
                 if not left:
                     raise _held(path, ", ".join(windows.holders(path))) from error
                 time.sleep(0.05)
