@@ -256,6 +256,19 @@ def test_no_worker_yet_is_told_and_waited_for(
     assert f"`dask worker {made.address}`" in told
 
 
+@pytest.mark.slow
+def test_a_scheduler_that_dies_before_there_is_a_worker_is_told(tmp_path: Path) -> None:
+    path = os.pathsep.join(
+        [str(Path(__file__).resolve().parents[1]), os.environ.get("PYTHONPATH", "")]
+    )
+    with farm(tmp_path / "farm", workers=0, PYTHONPATH=path) as made:
+        later = threading.Timer(1.5, made.kill, [made.scheduler])
+        later.start()
+        with pytest.raises(Palette4dError, match=r"scheduler at .* went away .*again"):
+            Workers(cluster=made.address).run(piece, {2: 2}, {}.__setitem__)
+        later.join()
+
+
 @pytest.mark.parametrize("pause", [0, 2])  # after 2 seconds all are done, but only one is fetched
 def test_a_farm_that_loses_all_workers_ends_with_an_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], pause: int

@@ -285,7 +285,13 @@ def _check_workers(client: Any, address: str) -> None:
     started = time.monotonic()
     told = False
     while (waited := time.monotonic() - started) < WORKERS_WITHIN:
-        found = client.run(_version, on_error="return")
+        try:
+            found = client.run(_version, on_error="return")
+        except OSError as error:
+            raise Palette4dError(
+                f"the scheduler at {address} went away ({error}); start it, and run the same "
+                "command again"
+            ) from error
         # The worker died or lost its connection: Dask drops it, so it needs no error here.
         there = {who: it for who, it in found.items() if not isinstance(it, OSError)}
         for worker, version in sorted(there.items()):
