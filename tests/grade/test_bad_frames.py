@@ -304,9 +304,10 @@ class TestAgain:
         words = [sidecar, clip, "-o", out, "--skip-existing"]
         assert self.run(*words) == 0
         whole = out.read_bytes()
-        for damaged in (whole[:3000], whole[: len(whole) // 2], b"mine"):
+        for damaged in (whole[:300], whole[: len(whole) // 2], whole[:-40], b"mine"):
             out.write_bytes(damaged)
             assert self.run(*words) == 0
+            assert out.read_bytes() != damaged
             assert levels(out)[2] == pytest.approx(30, abs=1)
         status = out.stat().st_mtime_ns
         capsys.readouterr()

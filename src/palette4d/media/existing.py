@@ -50,6 +50,7 @@ def movie(path: Path, frames: Sequence[int], is_wanted: Callable[[str], bool]) -
     """Look at a file that should be a movie of as many frames, as `frame` does."""
     try:
         clip = open_clip(str(path))
+        clip.read(clip.frames[-1])  # a file that was cut is still said to have all frames
     except (Palette4dError, OSError):
         return "damaged"
     return _state(len(clip.frames) == len(frames), clip.stated.made_by, is_wanted)
