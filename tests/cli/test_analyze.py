@@ -272,6 +272,51 @@ def test_picks_stay_at_their_places_in_a_clip_that_moved(clip, tmp_path, capsys)
     assert after.pixel[0] > 12
 
 
+def test_a_pick_of_a_still_keeps_its_frame(clip, tmp_path):
+    out = tmp_path / "still.p4d.json"
+    analyze = ["analyze", str(clip / "shot.1003.png"), "-o", str(out), "--quiet"]
+    assert main.main(analyze) == 0
+    pick = [
+        "pick",
+        "--frame",
+        "1003",
+        "--colour",
+        "0.5,0.4,0.3",
+        "--to",
+        "#305090",
+        "--from",
+        "1003",
+    ]
+    assert main.main(["edit", str(out), *pick]) == 0
+    before = Document.load(out)
+    again = [*analyze, "--keep-edits", "--method", "static", "--set", "palette_size=5"]
+    assert main.main(again) == 0
+    after = Document.load(out)
+    assert after.grade.handles.vertices != before.grade.handles.vertices
+    assert after.grade.picks == before.grade.picks
+
+
+def test_picks_of_a_picture_that_was_mirrored_are_told(clip, tmp_path, capsys):
+    """It has the same palette, so that all edits stay as they are."""
+    halves = np.where(np.arange(16)[None, :, None] < 8, [200, 40, 40], [90, 90, 95]).repeat(12, 0)
+    for mirrored in (False, True):
+        for path in clip.iterdir():
+            write_image(path, (halves[:, ::-1] if mirrored else halves).astype(np.uint8))
+        out = tmp_path / "shot.p4d.json"
+        assert main.main(["analyze", str(clip), "-o", str(out), *STATIC, "--keep-edits"]) == 0
+        told = "other colours now where these were picked: p1" in capsys.readouterr().err
+        assert told == mirrored
+        if not mirrored:
+            pick = ["pick", "--frame", "1002", "--pixel", "3,3", "--to", "#305090"]
+            assert main.main(["edit", str(out), *pick, "--window", "0,0,7,11"]) == 0
+            edits = Document.load(out).grade.state
+            analyze = ["analyze", str(clip), "-o", str(out), *STATIC, "--keep-edits"]
+            capsys.readouterr()
+            assert main.main(analyze) == 0
+            assert "other colours" not in capsys.readouterr().err
+    assert Document.load(out).grade.state == edits
+
+
 def test_the_places_of_picks_go_along_to_a_larger_version(clip, tmp_path, capsys):
     """A proxy's windows, boxes and areas lie at the same place of the full picture."""
     out, large = tmp_path / "shot.p4d.json", tmp_path / "large"

@@ -67,9 +67,9 @@ def with_picks(
     """
     source, opened = match.source, clip.open()
     if match.same_pictures:
-        kept = [pick.shifted(match.back(0.0)) for pick in source.picks]
+        kept = [pick.shifted(grade.frames[0] - source.frames[0]) for pick in source.picks]
         # A picture that was mirrored or cropped may have the same colours at other places.
-        if opened is None or all(_in_place(clip, pick) for pick in kept if pick.pixel is not None):
+        if opened is None or all(in_place(clip, pick) for pick in kept if pick.pixel is not None):
             picks: dict[Key, Pick] = {("pick", pick.id): pick for pick in kept}
             return grade.having(picks).with_mattes(source.mattes), NONE_LOST
     first, last, step = grade.frames
@@ -88,13 +88,13 @@ def with_picks(
         if here is None:
             left_out.append(f"{pick.id} ({asked_text(pick)})")
             continue
-        in_place = here.pixel is not None and here.pixel == pick.pixel
-        if same_clip and former.pixel is not None and not in_place:
+        stays = here.pixel is not None and here.pixel == pick.pixel
+        if same_clip and former.pixel is not None and not stays:
             elsewhere.append(pick.id)
         # In a palette of one frame nothing could be followed.
         if opened is not None and (former.path or begin == end):
             # What the user said of other frames holds where the place does.
-            given = [key for key in pick.path if key.given and in_place]
+            given = [key for key in pick.path if key.given and stays]
             here = replace(here, path=clip.path(here, given))
         copies.append((former, here))
     grade = grade.having({("pick", pick.id): pick for _, pick in copies})
@@ -115,7 +115,7 @@ def _found(
     # Else no colours can be compared.
     told = len(spaces) == 1 or "unknown" not in spaces
     if pick.pixel is not None:
-        if (rgb := _in_place(clip, pick, told=told)) is not None:
+        if (rgb := in_place(clip, pick, told=told)) is not None:
             return replace(pick, rgb=rgb)
         pick = replace(pick, areas=(), window=None)
     elif pick.whole_hue or (same_clip and former.pixel is None):
@@ -123,7 +123,7 @@ def _found(
     return clip.at_home(pick, match.target.display())
 
 
-def _in_place(clip: ClipOfPicks, pick: Pick, *, told: bool = True) -> Colour | None:
+def in_place(clip: ClipOfPicks, pick: Pick, *, told: bool = True) -> Colour | None:
     """Return the colour at a pick's place; None if it is another one, where that can be `told`."""
     assert pick.pixel is not None
     try:

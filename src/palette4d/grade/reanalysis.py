@@ -1,19 +1,21 @@
 """A new analysis that replaces an old sidecar: edits are kept, moved or copied."""
 
+import contextlib
 import itertools
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from palette4d.common import sandbox
 from palette4d.common.child import Child
-from palette4d.common.errors import SidecarError
+from palette4d.common.errors import Palette4dError, SidecarError
 from palette4d.common.files import link_target, replacing
 from palette4d.common.text import counted, some_of
 from palette4d.grade import sidecar
 from palette4d.grade.clip_of_picks import ClipOfPicks
+from palette4d.grade.copied_picks import in_place
 from palette4d.grade.copying import copied
 from palette4d.grade.correspondence import same_pictures
 from palette4d.grade.edits import Edit, Key, Kind, State, difference
@@ -23,6 +25,8 @@ from palette4d.grade.members import Fields, history_of
 from palette4d.grade.sidecar import OnEdits, Saved
 from palette4d.grade.versions import save_version, set_note
 from palette4d.media.clip_files import files_of
+
+T = TypeVar("T")
 
 #: `quality.options.method` of a palette that `analyze --like` moved.
 _MOVED = "like"
@@ -42,8 +46,11 @@ def save(
     target = link_target(path)
     old = sidecar.existing(target, on_edits) if on_edits == "keep" else None
     keeps = old is not None and sidecar.has_edits(old[1]) and not sidecar.has_edits(fields)
-    if old is None or not keeps or sidecar.same_palette(old[1], fields):
+    if old is None or not keeps:
         return sidecar.save(fields, target, on_edits=on_edits), []
+    if sidecar.same_palette(old[1], fields):
+        saved = sidecar.save(fields, target, on_edits=on_edits)
+        return saved, _misplaced(saved, target, clip)
     read, before = old[2], old[1]
     former = Grade.of(*old[:2], target)
     new = Grade.of(sidecar.validate(fields, str(target)), fields, None)
@@ -55,12 +62,8 @@ def save(
         steps = [_scaled_steps(part, by) for part in history_of(before, str(target))]
         kept_fields = {**moved.fields(*steps), "extra": extra}
         saved = sidecar.save(kept_fields, target, on_edits="drop", replaces=read)
-        return saved, scaled
-    if clip is not None and sandbox.of_command():
-        with Child(reads=files_of(clip)) as child:
-            copy, notes = child.call(_copied, read, fields, target, clip)
-    else:
-        copy, notes = _copied(read, fields, target, clip)
+        return saved, scaled + _misplaced(saved, target, clip)
+    copy, notes = _reading(clip, _copied, read, fields, target, clip)
     kept = _former(target, read)
     if not kept.exists():
         with replacing(kept, force=False) as temporary:
@@ -68,6 +71,35 @@ def save(
     notes.append(f"the former palette with its edits is kept in {kept.name}")
     kept_fields = {**copy, "extra": extra}
     return sidecar.save(kept_fields, target, on_edits="drop", replaces=read), scaled + notes
+
+
+def _reading(clip: str | None, work: Callable[..., T], *arguments: object) -> T:
+    """Do work that reads a clip; a confined command does it in a child."""
+    if clip is None or not sandbox.of_command():
+        return work(*arguments)
+    with Child(reads=files_of(clip)) as child:
+        return child.call(work, *arguments)
+
+
+def _misplaced(saved: Saved, target: Path, clip: str | None) -> list[str]:
+    """Return a note on picks whose places have other colours in the clip than were picked."""
+    _, fields, text = saved
+    placed = any("pixel" in pick for pick in fields["edits"].get("picks", ()))
+    moved = _reading(clip, _with_other_colours, text, target, clip) if placed else []
+    if not moved:
+        return []
+    return [f"there are other colours now where these were picked: {', '.join(moved)}"]
+
+
+def _with_other_colours(text: bytes, target: Path, given: str | None) -> list[str]:
+    grade = Grade.of(*sidecar.decoded(text, str(target)), target)
+    clip = ClipOfPicks.of(grade, given, target)
+    moved: list[str] = []
+    with contextlib.suppress(Palette4dError):  # a clip that is not the sidecar's
+        if not clip.missing:
+            placed = (pick for pick in grade.picks if pick.pixel is not None)
+            moved = [pick.id for pick in placed if in_place(clip, pick) is None]
+    return moved
 
 
 def _copied(
