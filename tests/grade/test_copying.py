@@ -472,6 +472,24 @@ def test_what_is_nowhere_in_a_clip_changes_nothing_there(monkeypatch: pytest.Mon
     assert (target.grade.state, target.history) == (before, steps)
 
 
+@pytest.mark.parametrize("corrected", [True, False])
+def test_corrections_of_paths_that_are_left_out_are_told(
+    monkeypatch: pytest.MonkeyPatch, corrected: bool
+) -> None:
+    """They are places in the other clip."""
+    source = Document(members("split"))
+    source.pick(8, colour=(0.4, 0.4, 0.4), by=(0.2, 0, 0), follow=False)
+    keys = (PathKey(8, (0.4, 0.4, 0.4), True), PathKey(12, (0.3, 0.4, 0.4), corrected))
+    followed = replace(source.grade.pick("p1"), path=keys)
+    target = Document(members("merge"))
+    (first, last, _), (width, height) = target.grade.frames, target.grade.members["clip"]["size"]
+    grey = np.full((last - first + 1, height, width, 3), 0.4, np.float32)
+    monkeypatch.setattr("palette4d.grade.clip_of_picks.find_clip", lambda *_: ArrayClip(grey))
+    fit = target.copy_from(Document(source.grade.put("pick", "p1", followed).fields()))
+    assert fit.lost.uncorrected == ("p1",) * corrected
+    assert target.grade.pick("p1").pixel is not None
+
+
 def test_a_window_stays_with_its_clip() -> None:
     source = Document(members("split"))
     seen = source.grade.palette(8).rgb.mean(axis=0).tolist()

@@ -34,6 +34,8 @@ class Lost:
         The picks whose colour is not in the target's clip, with what they are, for people.
     everywhere : tuple of str
         The ids of copied picks that have a window in the source: windows are not copied.
+    uncorrected : tuple of str
+        The ids of copied picks that are followed without what the user said of their paths.
     unlearned : tuple of str
         The ids of copied picks that take all of their hue, as there is no clip to learn from.
     """
@@ -41,6 +43,7 @@ class Lost:
     elsewhere: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     everywhere: tuple[str, ...] = ()
+    uncorrected: tuple[str, ...] = ()
     unlearned: tuple[str, ...] = ()
 
     def __str__(self) -> str:
@@ -50,6 +53,7 @@ class Lost:
             "frame is gone": self.elsewhere,
             "not copied, since nothing connected has the colour here": self.left_out,
             "without a window, since that is a place in the other clip": self.everywhere,
+            "followed without the corrections of their paths": self.uncorrected,
             "of all colours of their hue, since the clip was not found": self.unlearned,
         }
         return "".join(f"; {what}: {', '.join(ids)}" for what, ids in told.items() if ids)
@@ -77,7 +81,7 @@ def with_picks(
     frames = there or range(first, last + 1, step)
     begin, end, _ = source.frames
     copies: list[tuple[Pick, Pick]] = []
-    left_out, elsewhere = [], []
+    left_out, elsewhere, uncorrected = [], [], []
     for former in source.picks:
         pick = _timed(match, former, frames, same_clip=same_clip)
         if pick is None:
@@ -95,6 +99,8 @@ def with_picks(
         if opened is not None and (former.path or begin == end):
             # What the user said of other frames holds where the place does.
             given = [key for key in pick.path if key.given and stays]
+            corrected = any(key.given and key.frame != former.frame for key in former.path)
+            uncorrected += [pick.id] * (corrected and not given)
             here = replace(here, path=clip.path(here, given))
         copies.append((former, here))
     grade = grade.having({("pick", pick.id): pick for _, pick in copies})
@@ -102,6 +108,7 @@ def with_picks(
         tuple(elsewhere),
         tuple(left_out),
         tuple(pick.id for former, pick in copies if former.window and not pick.window),
+        tuple(uncorrected),
         tuple(pick.id for former, pick in copies if former.matte and opened is None),
     )
     return with_mattes(grade, clip, [pick for _, pick in copies]), lost
