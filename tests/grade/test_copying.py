@@ -503,6 +503,19 @@ def test_a_window_stays_with_its_clip() -> None:
     assert str(fit).endswith("without a window, since that is a place in the other clip: p1")
 
 
+def test_undone_edits_are_kept_in_the_former_file(tmp_path: Path) -> None:
+    path = tmp_path / "clip.p4d.json"
+    document = Document(members("split"))
+    document.set("v1", rgb=(0.2, 0.3, 0.4))
+    document.undo()
+    document.save(path)
+    before = path.read_bytes()
+    new = Document({**members("merge"), "edits": {"vertices": [], "stops": []}})
+    new.save(path, on_edits="keep")
+    assert (tmp_path / "clip.former.p4d.json").read_bytes() == before
+    assert any("clip.former.p4d.json" in note for note in new.notes)
+
+
 @pytest.mark.parametrize("same", [True, False])
 def test_a_new_analysis_keeps_windows(tmp_path: Path, same: bool) -> None:
     """A sidecar that is made again is of the same shot, whatever its clip is called now."""
@@ -514,6 +527,7 @@ def test_a_new_analysis_keeps_windows(tmp_path: Path, same: bool) -> None:
     ).window
     document.save_version("windowed")
     document.lock("v1")
+    document.set_ramp("step")
     document.save(path)
     fields = members("merge")
     fields["edits"] = {"vertices": [], "stops": []}
@@ -524,6 +538,7 @@ def test_a_new_analysis_keeps_windows(tmp_path: Path, same: bool) -> None:
     new.save(path, on_edits="keep")
     assert any("the grade was copied" in note for note in new.notes)
     assert any("1 lock of former handles left out: v1" in note for note in new.notes)
+    assert "the ramp between edits is linear; it was step" in new.notes
     found = Document.load(path)
     assert found.grade.pick("p1").window == window
     assert found.version("windowed").grade.pick("p1").window == window

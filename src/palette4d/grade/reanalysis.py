@@ -18,7 +18,7 @@ from palette4d.grade.clip_of_picks import ClipOfPicks
 from palette4d.grade.copied_picks import in_place
 from palette4d.grade.copying import copied
 from palette4d.grade.correspondence import same_pictures
-from palette4d.grade.edits import Edit, Key, Kind, State, difference
+from palette4d.grade.edits import RAMP_WORDS, Edit, Key, Kind, State, difference
 from palette4d.grade.grade import Grade
 from palette4d.grade.handle_edits import reset
 from palette4d.grade.members import Fields, history_of
@@ -45,8 +45,9 @@ def save(
     """
     target = link_target(path)
     old = sidecar.existing(target, on_edits) if on_edits == "keep" else None
-    keeps = old is not None and sidecar.has_edits(old[1]) and not sidecar.has_edits(fields)
-    if old is None or not keeps:
+    # Undone edits count: redo brings them back.
+    has_any = old is not None and (sidecar.has_edits(old[1]) or "history" in old[1])
+    if old is None or not has_any or sidecar.has_edits(fields):
         return sidecar.save(fields, target, on_edits=on_edits), []
     if sidecar.same_palette(old[1], fields):
         saved = sidecar.save(fields, target, on_edits=on_edits)
@@ -127,6 +128,8 @@ def _copied(
         notes.append(f"the palette changed, so that the grade was copied: {fit}")
     if locks := [id_ for kind, id_ in former.state if kind == "lock"]:
         notes.append(f"{counted(len(locks), 'lock')} of former handles left out: {some_of(locks)}")
+    if former.ramp != new.ramp:
+        notes.append(f"the ramp between edits is {new.ramp}; it was {RAMP_WORDS[former.ramp]}")
     name = "copy the grade of the former analysis"
     step = difference(analysed.state, new.state, name).undoable()
     steps: list[Edit] = [step] if step.changes else []
