@@ -503,6 +503,20 @@ def test_a_window_stays_with_its_clip() -> None:
     assert str(fit).endswith("without a window, since that is a place in the other clip: p1")
 
 
+def test_places_are_scaled_where_a_larger_clip_has_the_same_palette(tmp_path: Path) -> None:
+    path = tmp_path / "clip.p4d.json"
+    former = Document(members("split"))
+    where = {"window": (1, 2, 9, 8), "areas": (Area(12, ((3, 4),), 2),)}
+    former.pick(8, colour=(0.4, 0.4, 0.4), by=(0.2, 0, 0), follow=False, **where)
+    former.save(path)
+    fields = members("split")
+    width, height = fields["clip"]["size"]
+    fields["clip"]["size"] = [2 * width, 2 * height]
+    _, notes = reanalysis.save(fields, path, on_edits="keep")
+    assert any("scaled" in note for note in notes)
+    assert Document.load(path).grade.picks == (former.grade.pick("p1").scaled(2, 2),)
+
+
 def test_undone_edits_are_kept_in_the_former_file(tmp_path: Path) -> None:
     path = tmp_path / "clip.p4d.json"
     document = Document(members("split"))

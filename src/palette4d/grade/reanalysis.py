@@ -49,14 +49,14 @@ def save(
     has_any = old is not None and (sidecar.has_edits(old[1]) or "history" in old[1])
     if old is None or not has_any or sidecar.has_edits(fields):
         return sidecar.save(fields, target, on_edits=on_edits), []
-    if sidecar.same_palette(old[1], fields):
+    by = _growth(fields["clip"], old[1]["clip"])
+    if sidecar.same_palette(old[1], fields) and by == (1, 1):
         saved = sidecar.save(fields, target, on_edits=on_edits)
         return saved, _misplaced(saved, target, clip)
     read, before = old[2], old[1]
     former = Grade.of(*old[:2], target)
     new = Grade.of(sidecar.validate(fields, str(target)), fields, None)
     extra = fields.get("extra") or before["extra"]
-    by = _growth(fields["clip"], before["clip"])
     places = any(pick.marks or pick.window for pick in former.picks)
     scaled = [_SCALED] if places and by != (1, 1) else []
     if (moved := _with_same_handles(former, new, by)) is not None:
@@ -148,12 +148,13 @@ def _time(new: Grade, former: Grade) -> Literal["relative", "same"]:
 
 
 def _with_same_handles(old: Grade, new: Grade, by: tuple[float, float]) -> Grade | None:
-    """Return the new palette with the old edits, if `analyze --like` moved the old one to it.
+    """Return the new palette with the old edits, if it is the old one or `--like` moved that to it.
 
     `by` is how many times as wide and as high its clip is.
     """
     method = new.members.get("quality", {}).get("options", {}).get("method")
-    if method != _MOVED or _handles(old.members) != _handles(new.members):
+    moved_to_it = method == _MOVED and _handles(old.members) == _handles(new.members)
+    if not moved_to_it and not sidecar.same_palette(old.members, new.members):
         return None
     moved = new.with_mattes(old.mattes).with_state(_scaled(old.state, by))
     try:
