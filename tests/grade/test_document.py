@@ -137,6 +137,7 @@ def test_what_is_edited_is_seen_at_once(plain: Path) -> None:
         lambda d: d.reset("e1"),
         lambda d: d.grade.near((0, 0, 0), frame=21),
         lambda d: d.set_near((1, 1, 1), frame=3, rgb=WHITE),
+        lambda d: d.set_near((1, 1, 1), frame=3, id="e99", rgb=WHITE),
         lambda d: d.grade.palette(float("inf")),
         lambda d: d.save("missing/folder/clip.p4d.json"),
     ],

@@ -97,7 +97,7 @@ def test_it_is_inverted_and_stays_so_when_it_is_moved(rows: WindowRows) -> None:
     assert own is not None
     assert own.inverted
     rows.numbers["x"].setValue(rows.numbers["x"].value() + 3)
-    rows._keep()
+    rows.session.keep_typed()
     moved = window_of(rows)
     assert moved is not None
     assert moved.inverted
@@ -179,6 +179,42 @@ def test_numbers_are_typed_as_one_step(rows: WindowRows, qtbot: Any) -> None:
     assert rows.numbers["height"].value() == bottom - top
     rows.session.undo()
     assert box_of(rows) == [left, top, right, bottom]
+
+
+@pytest.mark.parametrize("then", ["feather", "invert", "undo", "save", "colour", "close"])
+def test_typed_numbers_are_kept_before_what_is_done_next(
+    rows: WindowRows, then: str, qtbot: Any
+) -> None:
+    """They are followed when they rest; what is done before that does not take their place."""
+    switch(rows)
+    session, before = rows.session, steps(rows)
+    left, top, right, bottom = box_of(rows)
+    rows.numbers["x"].setValue(left + 5)
+    assert session.dragging
+    path = session.path
+    assert path is not None
+    if then == "feather":
+        rows.feather.setValue(7)
+    elif then == "invert":
+        rows.invert.click()
+    elif then == "undo":
+        session.undo()
+        assert box_of(rows) == [left, top, right, bottom]
+        assert steps(rows) == before
+        return
+    elif then == "save":
+        session.save()
+    elif then == "colour":
+        session.drag(lambda document: document.adjust(by=(0.1, 0, 0)))
+        session.drop()
+    else:
+        session.close()
+        (pick,) = Document.load(path).grade.picks
+        assert pick.window is not None
+        assert pick.window.given.keys[0].box[0] == left + 5
+        return
+    assert box_of(rows)[0] == left + 5
+    assert steps(rows) == before + (1 if then == "save" else 2)
 
 
 def test_the_numbers_are_those_of_the_playhead(

@@ -10,6 +10,7 @@ import pytest
 import palette4d
 from palette4d import Document
 from palette4d.colour.oklch import Adjustment
+from palette4d.studio.solid_view import Moving
 from palette4d.studio.targets import PickTo, Recolour, RecolourMany, Target, target_of
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
@@ -41,6 +42,22 @@ def test_a_handle_is_at_its_own_frame_and_an_edge_at_the_playhead(document: Docu
     assert (at_end.kind, at_end.id) in {("vertex", "v1"), ("edge", "e1")}
     assert target_of(document, "e1", 15.0) is None
     assert target_of(document, "nothing", 3.0) is None
+
+
+def test_of_colours_that_are_equal_there_the_selected_one_changes(document: Document) -> None:
+    """As where a clip fades to black: all rows have one colour."""
+    ids = [id_ for id_ in document.grade.palette(3.0).ids if id_ in document.grade.handles.edges]
+    for id_ in ids:
+        document.stop(id_, frame=3.0, rgb=(0.0, 0.0, 0.0))
+    for id_ in ids:
+        edited = Document(document.fields())
+        Recolour(target(edited, id_, 3.0), (id_,), 3.0, (0.9, 0.1, 0.1))(edited)
+        moved = Document(document.fields())
+        assert Moving(id_, 3.0, [0.0, 0.0, 0.0], [0.9, 0.1, 0.1])(moved) in moved.grade.settings
+        for found in (edited, moved):
+            palette = found.grade.palette(3.0)
+            red = [i for i, rgb in zip(palette.ids, palette.edited, strict=True) if rgb[0] > 0.8]
+            assert red == [id_]
 
 
 def test_several_handles_move_by_the_same_offset_in_one_step(document: Document) -> None:

@@ -192,6 +192,7 @@ class Document:
         *,
         frame: float,
         anyway: bool = False,
+        id: str | None = None,
         **how: Unpack[How],
     ) -> Near:
         """Change the palette colour nearest to a given colour at a frame.
@@ -207,6 +208,8 @@ class Document:
             The time; within the clip.
         anyway : bool
             Edit the palette colour even if it is more than 0.25 away.
+        id : str, optional
+            The palette colour, of `Palette.ids` at the frame: several may have nearly one colour.
         **how
             The change, as in `adjust`: ``rgb=``, or others; ``any_value=``.
 
@@ -223,7 +226,7 @@ class Document:
             that `near` is mixed from.
         """
         return self._made(
-            handle_edits.set_near(self.grade, near, frame=frame, anyway=anyway, **how)
+            handle_edits.set_near(self.grade, near, frame=frame, anyway=anyway, id=id, **how)
         )
 
     def move(self, stop: str, *, frame: float) -> None:

@@ -279,8 +279,8 @@ class Grade:
         palette = self.palette(frame)
         return as_colour(palette.edited[palette.ids.index(edge)])
 
-    def near(self, rgb: Iterable[float], *, frame: float) -> Near:
-        """Return the palette colour nearest to a given colour at a frame.
+    def near(self, rgb: Iterable[float], *, frame: float, id: str | None = None) -> Near:
+        """Return the palette colour nearest to a given colour at a frame, or that of an id.
 
         The edited palette is compared. The handle is the stop at that time, or the vertex of the
         colour's edge less than a frame step from that time.
@@ -288,7 +288,9 @@ class Grade:
         wanted = as_colour(rgb)
         self.check_frame(frame)
         palette = self.palette(frame)
-        index, distance = palette.nearest(wanted)
+        if id is not None and id not in palette.ids:
+            raise unknown(id, "palette colour", palette.ids)
+        index, distance = palette.nearest(wanted, id)
         id_ = palette.ids[index]
         return Near(
             frame=frame,

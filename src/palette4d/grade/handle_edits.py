@@ -93,11 +93,12 @@ def set_near(
     *,
     frame: float,
     anyway: bool = False,
+    id: str | None = None,
     **how: Unpack[How],
 ) -> tuple[Grade, Near]:
     """Change the palette colour nearest to a given colour at a frame (`Document.set_near`)."""
     wanted = grade.checked(near, how.get("any_value", False))
-    nearest = grade.near(wanted, frame=frame)
+    nearest = grade.near(wanted, frame=frame, id=id)
     if nearest.distance > FAR and not anyway:
         raise Palette4dError(nearest.refusal(wanted))
     if _range(grade, how) is not None:

@@ -41,10 +41,13 @@ class Palette:
     ends: tuple[tuple[str, str], ...]
     weights: NDArray[np.float64]
 
-    def nearest(self, colour: Colour) -> tuple[int, float]:
-        """Return the index of the edited colour nearest to a colour, and their RGB distance."""
+    def nearest(self, colour: Colour, id: str | None = None) -> tuple[int, float]:
+        """Return the index of the edited colour nearest to a colour, and their RGB distance.
+
+        With an id, of that colour.
+        """
         distances = np.linalg.norm(self.edited - np.asarray(colour), axis=1)
-        index = int(np.argmin(distances))
+        index = int(np.argmin(distances)) if id is None else self.ids.index(id)
         return index, float(distances[index])
 
     def shares(self, colour: Colour) -> list[tuple[str, float]]:

@@ -204,10 +204,17 @@ def set_window(session: Session, id_: str, frame: float, box: Box) -> None:
     session.edit_later(put, texts.WINDOW_SET.format(id=id_, frame=style.number(frame)))
 
 
-def drag_window(session: Session, id_: str, frame: float, box: Box) -> None:
+def drag_window(session: Session, id_: str, frame: float, box: Box, *, typed: bool = False) -> None:
     """Show a pick's window somewhere else, without following it yet."""
     text = texts.WINDOW_SET.format(id=id_, frame=style.number(frame))
-    session.drag(lambda document: document.set_window(id_, frame, box, clip=Unread()), text)
+
+    def keep() -> None:
+        set_window(session, id_, frame, box)
+
+    def put(document: Document) -> None:
+        document.set_window(id_, frame, box, clip=Unread())
+
+    session.drag(put, text, keep if typed else None)
 
 
 def feather_window(session: Session, id_: str, feather: float, *, dragging: bool = False) -> None:

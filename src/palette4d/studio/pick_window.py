@@ -11,7 +11,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from palette4d.grade.picks import MOST_PIXELS, Box, Window
+from palette4d.grade.picks import MOST_PIXELS, Window
 from palette4d.plotting import style
 from palette4d.studio import grade_steps, texts, theme
 from palette4d.studio.colour_widgets import Bar
@@ -43,10 +43,10 @@ class WindowRows(QObject):
     def __init__(self, session: Session, grid: QGridLayout, line: int, beside: QWidget) -> None:
         super().__init__()
         self.session = session
-        self._typed: tuple[str, float, Box] | None = None  # a box that is not followed yet
+        self._typed: tuple[str, float] | None = None  # the pick and the frame of a typed box
         self._resting = QTimer(self)
         self._resting.setSingleShot(True)
-        self._resting.timeout.connect(self._keep)
+        self._resting.timeout.connect(session.keep_typed)
         self.on = QCheckBox(texts.WINDOW)
         self.on.setToolTip(texts.WINDOW_TIP)
         self.on.clicked.connect(self._switched)
@@ -178,11 +178,10 @@ class WindowRows(QObject):
         if pick is None or pick.window is None:
             return
         x, y, width, height = {**self._numbers_of(pick.window), name: value}.values()
-        self._typed = pick.id, self.session.frame, (x, y, x + width, y + height)
-        grade_steps.drag_window(self.session, *self._typed)
+        where = pick.id, self.session.frame
+        if where != self._typed:
+            self.session.keep_typed()
+        self._typed = where
+        box = x, y, x + width, y + height
+        grade_steps.drag_window(self.session, *where, box, typed=True)
         self._resting.start(REST)
-
-    def _keep(self) -> None:
-        typed, self._typed = self._typed, None
-        if typed is not None and self.session.dragging:
-            grade_steps.set_window(self.session, *typed)

@@ -63,6 +63,7 @@ class Session(Drafts):
         self._document: Document | None = None
         self._trial: Document | None = None
         self._dragged: tuple[Edit, str] | None = None
+        self._typed: Callable[[], object] | None = None  # keeps a drag that no pointer holds
         self._copy: Path | None = None  # has the edits that could not be saved
         self._real = Path()  # where links led when the file was opened: its disk may go
         self._stamp: tuple[int, int, int] | None = None
@@ -194,6 +195,7 @@ class Session(Drafts):
 
     def _leave(self) -> None:
         """Close; what cannot be saved stays open, so that nothing is lost."""
+        self.keep_typed()
         if self.following:
             raise Palette4dError(texts.STILL_FOLLOWING)
         if not self.saved and not self.save():
@@ -207,7 +209,7 @@ class Session(Drafts):
         if self.player is not None:
             self.player.close()
         self._follower.clear()
-        self._document = self._trial = self._dragged = None
+        self._document = self._trial = self._dragged = self._typed = None
         self._copy = None
         self.clip = self.player = self._stamp = self.probe = self.hover = self.place = None
         self.selection, self.playing, self.marks = (), 0, None
@@ -221,6 +223,7 @@ class Session(Drafts):
 
     def edit(self, operation: Callable[[Document], T], text: str = "") -> T | None:
         """Do an edit, as a verb does it; an error becomes the status, and None is returned."""
+        self.keep_typed()
         document = self._document
         if document is None:
             return None
@@ -317,7 +320,7 @@ class Session(Drafts):
         if dragged is None:
             self._changed()
         else:
-            self.drag(*dragged)
+            self._show(*dragged)
 
     def take_mattes(self, trial: Document) -> None:
         """Have the mattes that were learned for a copy of the document."""
@@ -325,8 +328,25 @@ class Session(Drafts):
             own = self._document
             own.grade = own.grade.with_mattes(trial.grade.mattes)
 
-    def drag(self, operation: Edit, text: str = "") -> None:
-        """Show an edit without doing it; each call replaces the last."""
+    def drag(
+        self, operation: Edit, text: str = "", typed: Callable[[], object] | None = None
+    ) -> None:
+        """Show an edit without doing it; each call replaces the last.
+
+        `typed` does one that no pointer holds: soon, but before any other edit or save.
+        """
+        if typed is None:
+            self.keep_typed()
+        self._show(operation, text)
+        self._typed = typed
+
+    def keep_typed(self) -> None:
+        """Do an edit that was typed and is only shown yet."""
+        keep, self._typed = self._typed, None
+        if keep is not None and self.dragging:
+            keep()
+
+    def _show(self, operation: Edit, text: str) -> None:
         if self._document is None:
             return
         trial = Document(self._document.grade)
@@ -345,6 +365,7 @@ class Session(Drafts):
 
     def cancel(self) -> None:
         """Forget the edit that is being dragged."""
+        self._typed = None
         if self._dragged is not None:
             self._trial = self._dragged = None
             self._changed()
@@ -393,12 +414,16 @@ class Session(Drafts):
             now - self._last_edit >= SAVE_AFTER or now - self._edited_at >= SAVE_AT_MOST
         )
         if due:
-            self.save(now)
+            self._save(now)
         elif self.saved and not self.dragging and _stamp(document.path) != self._stamp:
             self._reload()
 
-    def save(self, now: float | None = None) -> bool:
+    def save(self) -> bool:
         """Save now; return whether everything is on disk. Errors become the status."""
+        self.keep_typed()
+        return self._save(time.monotonic())
+
+    def _save(self, now: float) -> bool:
         document = self._document
         if document is None or document.path is None:
             return document is None
@@ -406,7 +431,7 @@ class Session(Drafts):
         try:
             document.save()
         except Exception as error:  # whatever fails, the edits stay, and the window says so
-            self._next_try = (time.monotonic() if now is None else now) + TRY_AGAIN
+            self._next_try = now + TRY_AGAIN
             self._keep_copy(error)
             return False
         self._edited_at = None
@@ -419,7 +444,7 @@ class Session(Drafts):
             if self._dragged is None:
                 self._changed()
             else:
-                self.drag(*self._dragged)
+                self._show(*self._dragged)
         self.emit("status")
         return True
 
@@ -456,6 +481,7 @@ class Session(Drafts):
 
     def save_as(self, path: str | os.PathLike[str]) -> bool:
         """Save under another name and go on with that file; return whether it worked."""
+        self.keep_typed()
         if self._document is None:
             return False
         try:
@@ -464,7 +490,7 @@ class Session(Drafts):
         except (Palette4dError, OSError) as error:
             self.report(error)
             return False
-        self._document, self._trial, self._dragged = loaded, None, None
+        self._document, self._trial, self._dragged, self._typed = loaded, None, None, None
         self._edited_at, self._stamp = None, _stamp(Path(path))
         if self._copy is not None and not same_file(self._copy, Path(path)):
             self._drop_copy()
@@ -490,7 +516,7 @@ class Session(Drafts):
             self.say(f"{texts.BROKEN} {in_words(error)}", "error")
             return
         former = None if self._document is None else self._document.grade.core.clip
-        self._document, self._trial, self._dragged = loaded, None, None
+        self._document, self._trial, self._dragged, self._typed = loaded, None, None, None
         self._stamp, self._edited_at = stamp, None
         clip = loaded.grade.core.clip
         of_clip = ("source", "first", "last")

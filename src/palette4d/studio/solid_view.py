@@ -377,5 +377,5 @@ class Moving:
         if self.id in document.grade.core.polytope.vertex_ids:
             document.set(self.id, rgb=self.new)
             return self.id
-        near = document.set_near(self.old, frame=self.frame, rgb=self.new, anyway=True)
+        near = document.set_near(self.old, frame=self.frame, id=self.id, rgb=self.new)
         return near.handle or near.id

@@ -128,8 +128,8 @@ class Recolour:
                     continue
                 new = self.rgb if id_ == self.target.id else (target.after + by).tolist()
                 if target.kind == "edge":
-                    old = target.after.tolist()
-                    document.set_near(old, frame=target.frame, rgb=new, anyway=True, any_value=True)
+                    old, at = target.after.tolist(), target.frame
+                    document.set_near(old, frame=at, id=target.id, rgb=new, any_value=True)
                 else:
                     document.set(target.id, rgb=new, any_value=True)
 

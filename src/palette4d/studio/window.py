@@ -465,6 +465,7 @@ class Window(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Save; if that fails, ask before anything is lost. Edits that read the clip come first."""
+        self.session.keep_typed()
         if self.session.following and not self._closing:
             self._closing = True
             self.session.say(texts.CLOSES_SOON, "warning")
