@@ -16,6 +16,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QCheckBox, QComboBox, QLineEdit, QMessageBox
 
+from palette4d import Document
 from palette4d.cli.main import build_parser
 from palette4d.studio import texts
 from palette4d.studio.choice import SearchChoice
@@ -46,6 +47,22 @@ def test_the_options_of_an_analysis(opened: Window, sidecar: Path) -> None:
     assert dialog.command.toPlainText().endswith(
         "--keep-edits --vertices 9 --method paper --set a=1 --set b=2"
     )
+
+
+def test_no_verb_reads_a_file_that_lacks_the_windows_edits(opened: Window, sidecar: Path) -> None:
+    session = opened.session
+    session.edit(lambda document: document.set("v1", rgb=(0.1, 0.2, 0.3)))
+    theirs = Document.load(sidecar)
+    theirs.set("v1", rgb=(0.3, 0.2, 0.1))
+    theirs.save()
+    dialog = opened.verbs.bake()
+    dialog.start()
+    assert dialog.job is None
+    assert texts.NOT_SAVED in dialog.stage.text()
+    session.revert()
+    dialog.start()
+    assert dialog.job is not None
+    dialog.job.cancel()
 
 
 def test_shots_go_to_a_folder(opened: Window, sidecar: Path) -> None:

@@ -97,6 +97,8 @@ class VerbDialog(QDialog):
         Runs a function on the window's thread.
     done : callable, optional
         Called with the dialog after a success.
+    refused : callable, optional
+        Called before the verb runs; returns why it must not, or "".
 
     Attributes
     ----------
@@ -116,6 +118,7 @@ class VerbDialog(QDialog):
         fields: Sequence[Field],
         post: Callable[[Callable[[], object]], object],
         done: Callable[["VerbDialog"], object] | None = None,
+        refused: Callable[[], str] = str,
     ) -> None:
         """Make the form."""
         super().__init__(parent)
@@ -125,7 +128,7 @@ class VerbDialog(QDialog):
         self.verb, self.fields = verb, tuple(sorted(fields, key=lambda field: field.more))
         self.job: Job | None = None
         self.notes, self.advised = "", list[str]()
-        self._post, self._done = post, done
+        self._post, self._done, self._refused = post, done, refused
         self.inputs: list[Entry] = []
         column = QVBoxLayout(self)
         column.setContentsMargins(16, 14, 16, 14)
@@ -167,6 +170,8 @@ class VerbDialog(QDialog):
         self.bar.setTextVisible(False)
         self.bar.setFixedHeight(8)
         self.stage = QLabel()
+        self.stage.setTextFormat(Qt.TextFormat.PlainText)
+        self.stage.setWordWrap(True)
         self.log = QPlainTextEdit()
         self.log.setReadOnly(True)
         self.log.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
@@ -285,6 +290,10 @@ class VerbDialog(QDialog):
 
     def start(self) -> None:
         """Run the verb."""
+        if why := self._refused():
+            self.stage.setText(why)
+            self.stage.show()
+            return
         self.started.emit()
         self.log.clear()
         for button in self.offers:

@@ -88,8 +88,9 @@ class VerbMenu:
         fields: list[Field],
         done: Callable[[VerbDialog], object] | None = None,
     ) -> VerbDialog:
-        self.session.save()
-        dialog = VerbDialog(self.window, title, verb, fields, self.session.post, done)
+        session = self.session
+        session.save()
+        dialog = VerbDialog(self.window, title, verb, fields, session.post, done, self._unsaved)
         own = Path.home() / OWN_FOLDER
         for field in fields:
             if field.kind in ("save", "folder") and own == Path(field.value).parent:
@@ -99,6 +100,10 @@ class VerbMenu:
         self.dialogs.append(dialog)
         dialog.destroyed.connect(lambda: self.dialogs.remove(dialog))
         return dialog
+
+    def _unsaved(self) -> str:
+        """Return why the edits of the window are not in the file that a verb reads; else ""."""
+        return "" if self.session.save() else self.session.status.text
 
     @property
     def _clip_source(self) -> str:
