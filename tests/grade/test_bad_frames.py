@@ -295,6 +295,21 @@ class TestAgain:
         assert render(PLAIN, spec, out, skip_existing=True, **NONE).frames == [1]
         assert levels(out) == {1: 153}
 
+    def test_one_file_of_another_frame_is_rendered_again(self, tmp_path: Path) -> None:
+        clip, out = sequence(tmp_path / "in", [1, 2, 3]), tmp_path / "one.png"
+        kept = []
+        for frame in ("2", "3", "3"):
+            words = [PLAIN, clip, "-o", out, "--skip-existing", "--frames", frame]
+            before = out.stat().st_ino if out.exists() else None
+            assert self.run(*words) == 0
+            kept.append(out.stat().st_ino == before)
+        assert kept == [False, False, True]
+
+    def test_the_clip_itself_is_no_earlier_render(self, tmp_path: Path) -> None:
+        clip = sequence(tmp_path / "in", [1, 2, 3])
+        with pytest.raises(Palette4dError, match="clip itself"):
+            render(PLAIN, clip, clip, skip_existing=True, **NONE)
+
     def test_a_movie_stays_if_it_is_whole(
         self, tmp_path: Path, capsys: pytest.CaptureFixture
     ) -> None:

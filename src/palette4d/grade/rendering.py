@@ -321,9 +321,7 @@ def render(
                 "movies"
             )
         # A frame that could not be read may be whole now.
-        files = dict.fromkeys(map(clip.file, clip.frames))
-        sizes = [path.stat().st_size for path in files if path.is_file()]
-        shown = clip.frames, sizes, clip.skipped, fill
+        shown = *pictures_of(clip), clip.skipped, fill
         by = made_by(document, clip, drawn, compare, space, codec, crf, sound, *shown)
         repeated = []
         if skip_existing and Path(output).exists():
@@ -349,7 +347,8 @@ def render(
         refuse_codec(output, codec, crf)
         pattern = FramePattern.parse(output, ", or a movie OUT.mp4 or OUT.mov")
         samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)
-        by = made_by(document, clip, drawn, compare, space, samples)
+        one = pictures_of(clip) if pattern.width is None else ()
+        by = made_by(document, clip, drawn, compare, space, samples, *one)
         todo, repeated = frames_to_render(
             clip, pattern, size, by, fill, skip_existing=skip_existing, force=force
         )
@@ -475,7 +474,7 @@ def frames_to_render(
     states = {frame: state_of(frame, path) for frame, path in there.items()}
     todo = [frame for frame in targets if states.get(frame) != "whole"]
     inputs = set(map(clip.file, clip.frames))
-    check_targets([targets[frame] for frame in todo], inputs, force or skip_existing)
+    check_targets([*targets.values()], inputs, force or skip_existing)
     return todo, existing.again(list(states.values()))
 
 
@@ -498,6 +497,12 @@ def _is_wanted(
 def _filled(fill: str, frame: int) -> str:
     """Return what a file says of a bad frame that shows another one."""
     return fill if fill == "black" else f"{fill} {frame}"
+
+
+def pictures_of(clip: Clip) -> tuple[list[int], list[int]]:
+    """Return what tells the pictures of a file whose name tells none: frames, and their sizes."""
+    files = dict.fromkeys(map(clip.file, clip.frames))
+    return list(clip.frames), [path.stat().st_size for path in files if path.is_file()]
 
 
 def made_by(document: Document, clip: Clip, *how: object) -> str:

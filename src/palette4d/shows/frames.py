@@ -137,7 +137,8 @@ def _on_farm(
     pattern = FramePattern.parse(str(output))
     samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)
     drawn = Output(**picture)
-    by = rendering.made_by(document, clip, drawn, compare, space, samples)
+    one = rendering.pictures_of(clip) if pattern.width is None else ()
+    by = rendering.made_by(document, clip, drawn, compare, space, samples, *one)
     size = clip.width * (2 if compare == "side" else 1), clip.height
     todo, repeated = rendering.frames_to_render(
         clip, pattern, size, by, fill, skip_existing=skip_existing, force=force
