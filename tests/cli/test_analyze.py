@@ -296,6 +296,23 @@ def test_a_pick_of_a_still_keeps_its_frame(clip, tmp_path):
     assert after.grade.picks == before.grade.picks
 
 
+def test_edits_go_along_with_frames_that_like_numbers_anew(clip, tmp_path):
+    """Some numbers are those of other frames of the version before."""
+    halves = np.where(np.arange(16)[None, :, None] < 8, [200, 40, 40], [90, 90, 95]).repeat(12, 0)
+    for i, path in enumerate(sorted(clip.iterdir())):
+        write_image(path, (halves + 4 * i).astype(np.uint8))
+        write_image(tmp_path / "v2" / f"shot.{1003 + i}.png", (halves + 4 * i + 1).astype(np.uint8))
+    out = tmp_path / "shot.p4d.json"
+    assert main.main(["analyze", str(clip), "-o", str(out), "--quiet"]) == 0
+    when = ["--frame", "1003", "--from", "1002", "--until", "1003"]
+    pick = ["pick", *when, "--pixel", "3,4", "--to", "#305090"]
+    assert main.main(["edit", str(out), *pick]) == 0
+    again = ["analyze", str(tmp_path / "v2"), "-o", str(out), "--quiet", "--like", str(out)]
+    assert main.main([*again, "--keep-edits"]) == 0
+    (kept,) = Document.load(out).grade.picks
+    assert (kept.frame, kept.start, kept.until) == (1005, 1004, 1005)
+
+
 def test_picks_of_a_picture_that_was_mirrored_are_told(clip, tmp_path, capsys):
     """It has the same palette, so that all edits stay as they are."""
     halves = np.where(np.arange(16)[None, :, None] < 8, [200, 40, 40], [90, 90, 95]).repeat(12, 0)

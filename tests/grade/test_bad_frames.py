@@ -15,6 +15,7 @@ from clip_files import TimeCode, write_image, write_movie
 from palette4d.cli import main
 from palette4d.common.errors import Palette4dError
 from palette4d.grade.document import Document
+from palette4d.grade.picks import Area
 from palette4d.grade.rendering import render
 from palette4d.media.clip import open_clip
 from palette4d.media.timecode import TIMECODE, start_timecode
@@ -405,3 +406,34 @@ def test_a_new_version_without_a_picks_place_keeps_the_pick(
     red = np.array([[[201, 41, 41]]], np.float32) / 255
     moved = Document.load(out).recolour(red, 2)[0, 0]
     assert moved == pytest.approx(np.array([0x30, 0x60, 0xB0]) / 255, abs=0.03)
+
+
+@pytest.mark.parametrize("fault", ["gone", "broken"])
+def test_areas_and_corrections_of_frames_that_cannot_be_read_are_told(
+    tmp_path: Path, fault: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    halves = np.where(np.arange(24)[None, :, None] < 12, [200, 40, 40], [90, 90, 95]).repeat(16, 0)
+    for version in (0, 1):
+        for frame in range(1, 9):
+            pixels = (halves + frame + version).astype(np.uint8)
+            write_image(tmp_path / f"v{version}" / f"g.{frame:04d}.png", pixels)
+    out = tmp_path / "g.p4d.json"
+    analyze = ["-o", str(out), "--quiet"]
+    assert main.main(["analyze", str(tmp_path / "v0"), *analyze, "--method", "static"]) == 0
+    document = Document.load(out)
+    document.pick(2, pixel=(5, 8), to="#3060b0", areas=[Area(6, ((3, 3),), 2)])
+    document.correct_path("p1", 6, pixel=(4, 8))
+    document.save()
+    bad = tmp_path / "v1" / "g.0006.png"
+    if fault == "gone":
+        bad.unlink()
+    else:
+        bad.write_bytes(b"no picture")
+    again = ["analyze", str(tmp_path / "v1"), *analyze, "--skip-bad-frames", "--keep-edits"]
+    assert main.main(again) == 0
+    said = capsys.readouterr().err
+    assert "without areas whose frames are gone, or cannot be read: p1" in said
+    assert "without the corrections of their paths: p1" in said
+    (kept,) = Document.load(out).grade.picks
+    assert (kept.pixel, kept.areas) == ((5, 8), ())
+    assert kept.path

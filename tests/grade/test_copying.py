@@ -368,7 +368,7 @@ def with_colours(fields: dict[str, Any]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("numbers", [0, 7, 1000])
-@pytest.mark.parametrize("by", ["keep", "copy"])
+@pytest.mark.parametrize("by", ["keep", "copy", "copy to another"])
 def test_picks_of_the_same_pictures_stay_as_they_are(tmp_path: Path, by: str, numbers: int) -> None:
     """Also with other frame numbers, some of which both have: 7 to 27 after 0 to 20."""
     path = tmp_path / "clip.p4d.json"
@@ -395,8 +395,12 @@ def test_picks_of_the_same_pictures_stay_as_they_are(tmp_path: Path, by: str, nu
         versions = Document.load(path).version("kept").grade.picks
         assert versions == Document.load(path).grade.picks
     else:
-        new.copy_from(Document.load(path))
+        new.grade.members["clip"]["name"] += "_mirrored" * (by == "copy to another")
+        fit = new.copy_from(Document.load(path))
         new.save(path, on_edits="drop")
+        if by == "copy to another":
+            assert fit.lost.everywhere == ("p1", "p3")
+            return
     kept = Document.load(path).grade.picks
     assert kept == tuple(pick.shifted(numbers) for pick in former.grade.picks)
     assert kept[0].window is not None
@@ -438,6 +442,9 @@ def test_picks_are_copied() -> None:
     still.copy_from(source, time=8)
     (pick,) = still.grade.picks
     assert (pick.start, pick.until) == (None, None)
+    still.copy_from(source, time=3)  # in the middle of a ramp
+    (pick,) = still.grade.picks
+    assert np.subtract(pick.to, pick.rgb) == pytest.approx([0.1, 0, 0])
 
 
 @pytest.mark.parametrize(

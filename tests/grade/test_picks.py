@@ -11,7 +11,7 @@ from grade.test_answer import document_of
 
 import palette4d
 from palette4d.common.errors import Palette4dError, SidecarError
-from palette4d.grade import copying, later, mattes, pick_edits, rendering, sidecar
+from palette4d.grade import copying, later, mattes, pick_edits, sidecar, unread_steps
 from palette4d.grade.clip_colours import ClipColours
 from palette4d.grade.clip_of_picks import ClipOfPicks, largest_part
 from palette4d.grade.document import Document
@@ -447,10 +447,10 @@ def test_a_window_is_followed_when_the_clip_is_read(monkeypatch: pytest.MonkeyPa
     document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
     before = document.grade
     document.set_window("p1", 0, BOX, clip=later.Unread())
-    document.history = later.as_unread(document.history)
+    document.history = unread_steps.as_unread(document.history)
     made, step = document.grade, document.history.done[-1]
     assert made.pick("p1").window == Window(2.8, (WindowKey(0, BOX, True),))
-    assert rendering.unread_picks(document) == ["p1"]
+    assert unread_steps.unread_picks(document.grade, document.history) == ["p1"]
     # The program that made it ended: the next one does it again.
     trial = Document(before)
     later.do_again(trial, step, ClipOfPicks.of(before), None)
@@ -462,7 +462,43 @@ def test_a_window_is_followed_when_the_clip_is_read(monkeypatch: pytest.MonkeyPa
     grade, history = later.completed(made, document.history, steps, readings, {})
     assert grade.pick("p1") == trial.grade.pick("p1")
     assert not history.done[-1].unread
-    assert rendering.unread_picks(trial) == []
+    assert unread_steps.unread_picks(trial.grade, trial.history) == []
+
+
+@pytest.mark.parametrize("same_clip", [True, False])
+def test_what_the_clip_was_not_read_for_is_read_in_a_copy(
+    monkeypatch: pytest.MonkeyPatch, same_clip: bool
+) -> None:
+    """Of the same pictures picks stay as they are, but for these."""
+    document = moving(monkeypatch)
+    empty = document.grade
+    where: dict[str, Any] = {"pixel": (20, 30), "box": 9, "to": "#2040b0"}
+    document.pick(0, **where)
+    document.set_window("p1", 0, BOX)
+    read = document.grade
+    document.reset()
+    document.pick(0, **where, clip=later.Unread(read.pick("p1").rgb))
+    document.set_window("p1", 0, BOX, clip=later.Unread())
+    document.history = unread_steps.as_unread(document.history)
+    assert document.grade.pick("p1").matte is None
+    target = Document(empty)
+    if same_clip:
+        clip = ClipOfPicks.of(empty)
+        grade, _ = copying.copied(empty, document.grade, clip, same_clip=True, unread=["p1"])
+    else:
+        target.copy_from(document)
+        grade = target.grade
+    assert grade.pick("p1").path == read.pick("p1").path
+    assert grade.pick("p1").matte == read.pick("p1").matte
+    assert grade.pick("p1").window == read.pick("p1").window
+
+
+def test_a_pick_that_moves_in_time_leaves_its_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = moving(monkeypatch)
+    document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
+    assert document.change_pick("p1", frame=3).pixel is None
+    assert document.change_pick("p1", frame=4, pixel=(44, 30)).pixel == (44, 30)
+    assert document.change_pick("p1", frame=4, reach=1.0).pixel == (44, 30)
 
 
 @pytest.mark.parametrize("kept", [False, True])
@@ -473,12 +509,12 @@ def test_a_newer_window_is_read_in_place_of_an_older_one_that_no_version_has(
     document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
     for box in (BOX, (0, 0, 60, 60)):
         document.set_window("p1", 0, box, clip=later.Unread())
-        document.history = later.as_unread(document.history)
+        document.history = unread_steps.as_unread(document.history)
         if kept and box == BOX:
             document.save_version("first")
     old, new = document.history.done[-2:]
-    assert later.replaces(new, old, document.grade.state) == (not kept)
-    waiting = [step for _, _, step in later.unread(document.grade, document.history)]
+    assert unread_steps.replaces(new, old, document.grade.state) == (not kept)
+    waiting = [step for _, _, step in unread_steps.unread(document.grade, document.history)]
     assert waiting == ([old, new] if kept else [new])
 
 

@@ -48,7 +48,7 @@ def add_actions(action: Action) -> None:
         "copy",
         "SOURCE [--time relative | same | frame T] [--shots PATTERN]",
         "take over the grade of another palette. Each handle gets the colour that the other grade "
-        "makes of its colour; picks are learned again in this clip. SIDECAR may be a show's "
+        "makes of its colour; picks are learned again in another clip. SIDECAR may be a show's "
         "NAME.shots.json: then all its shots get the grade. Former edits are kept as a version.",
     )
     parser.add_argument("source", metavar="SOURCE", type=Path, help="the graded sidecar")

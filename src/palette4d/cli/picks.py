@@ -509,7 +509,7 @@ def _told(document: Document, pick: Pick, followed: bool = False, boxed: bool = 
     `followed` and `boxed`: whether the path and the window were to be followed just now.
     """
     from palette4d.grade.colour_moves import fades_text
-    from palette4d.grade.rendering import unread_picks
+    from palette4d.grade.unread_steps import unread_picks
 
     asked = shown(pick.rgb) + (f" -> {shown(pick.to)}" if pick.to is not None else " stays")
     lines = [f"{pick.id}: {pick.kind} at frame {pick.frame:g}: {asked}"]
@@ -531,7 +531,7 @@ def _told(document: Document, pick: Pick, followed: bool = False, boxed: bool = 
                 "lost among others, or hardly there. Where you still see it: pick --frame T "
                 f"--pixel X,Y --with {pick.id}"
             )
-    elif pick.id in unread_picks(document):
+    elif pick.id in unread_picks(document.grade, document.history):
         lines.append("  is not followed through the clip yet: open the sidecar in Studio")
     else:
         source = document.grade.core.clip["source"]

@@ -177,6 +177,13 @@ class ClipOfPicks:
                     f"{clip.width - 1},{clip.height - 1}"
                 )
 
+    def shows(self, frame: float) -> bool:
+        """Whether a frame of the clip can be read, and has a colour."""
+        try:
+            return bool(np.isfinite(self.read(int(frame))).any())
+        except Palette4dError:
+            return False
+
     def read(self, frame: int) -> F32:
         """Return a frame's straight colours, (h, w, 3) in the palette's code values."""
         if frame not in self._read:

@@ -5,7 +5,7 @@ palette's clip, and followed: those that were picked in an earlier version of th
 place, if it has nearly their colour; others where their colour is.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -36,6 +36,8 @@ class Lost:
         The ids of copied picks that have a window in the source: windows are not copied.
     uncorrected : tuple of str
         The ids of copied picks that are followed without what the user said of their paths.
+    unseen : tuple of str
+        The ids of copied picks with areas at frames that are gone, or cannot be read.
     unlearned : tuple of str
         The ids of copied picks that take all of their hue, as there is no clip to learn from.
     """
@@ -44,6 +46,7 @@ class Lost:
     left_out: tuple[str, ...] = ()
     everywhere: tuple[str, ...] = ()
     uncorrected: tuple[str, ...] = ()
+    unseen: tuple[str, ...] = ()
     unlearned: tuple[str, ...] = ()
 
     def __str__(self) -> str:
@@ -54,6 +57,7 @@ class Lost:
             "not copied, since nothing connected has the colour here": self.left_out,
             "without a window, since that is a place in the other clip": self.everywhere,
             "followed without the corrections of their paths": self.uncorrected,
+            "without areas whose frames are gone, or cannot be read": self.unseen,
             "of all colours of their hue, since the clip was not found": self.unlearned,
         }
         return "".join(f"; {what}: {', '.join(ids)}" for what, ids in told.items() if ids)
@@ -63,31 +67,42 @@ NONE_LOST = Lost()
 
 
 def with_picks(
-    grade: Grade, match: Match, clip: ClipOfPicks, *, same_clip: bool
+    grade: Grade,
+    match: Match,
+    clip: ClipOfPicks,
+    *,
+    same_clip: bool,
+    unread: Collection[str] = (),
 ) -> tuple[Grade, Lost]:
     """Return a grade with the picks of the match's source, and what of them is lost.
 
-    `same_clip` says that the source is of an earlier version of the clip.
+    `same_clip` says that the source is of an earlier version of the clip; `unread` has the ids of
+    picks for which the clip was not read yet.
     """
     source, opened = match.source, clip.open()
-    if match.same_pictures:
+    names = [each.members["clip"]["name"] for each in (grade, source)]
+    same = match.same_pictures and (same_clip or names[0] == names[1])
+    same_clip = same_clip or same
+    if same and not (unread and opened):
         kept = [pick.shifted(grade.frames[0] - source.frames[0]) for pick in source.picks]
         # A picture that was mirrored or cropped may have the same colours at other places.
         if opened is None or all(in_place(clip, pick) for pick in kept if pick.pixel is not None):
             picks: dict[Key, Pick] = {("pick", pick.id): pick for pick in kept}
             return grade.having(picks).with_mattes(source.mattes), NONE_LOST
-    first, last, step = grade.frames
+    first, last, _ = grade.frames
     there = [] if opened is None else [n for n in opened.frames if first <= n <= last]
-    frames = there or range(first, last + 1, step)
     begin, end, _ = source.frames
     copies: list[tuple[Pick, Pick]] = []
-    left_out, elsewhere, uncorrected = [], [], []
+    left_out, elsewhere, uncorrected, unseen = [], [], [], []
     for former in source.picks:
-        pick = _timed(match, former, frames, same_clip=same_clip)
+        pick = _timed(match, former, there or range(first, last + 1), same_clip=same_clip)
         if pick is None:
             continue
         here: Pick | None = pick
         if opened is not None:
+            seen = _seen(clip, pick)
+            unseen += [pick.id] * (len(seen.areas) < len(former.areas) * same_clip)
+            pick = seen
             here = _found(match, clip, former, pick, same_clip=same_clip)
         if here is None:
             left_out.append(f"{pick.id} ({asked_text(pick)})")
@@ -96,11 +111,14 @@ def with_picks(
         if same_clip and former.pixel is not None and not stays:
             elsewhere.append(pick.id)
         # In a palette of one frame nothing could be followed.
-        if opened is not None and (former.path or begin == end):
+        if opened is not None and (former.path or former.id in unread or begin == end):
             # What the user said of other frames holds where the place does.
             given = [key for key in pick.path if key.given and stays]
-            corrected = any(key.given and key.frame != former.frame for key in former.path)
-            uncorrected += [pick.id] * (corrected and not given)
+            corrections = [key for key in former.path if key.given and key.frame != former.frame]
+            followed_from = [key for key in given if key.frame != here.frame]
+            uncorrected += [pick.id] * (len(followed_from) < len(corrections))
+            if here.window is not None and former.id in unread:
+                here = replace(here, window=clip.window(here, here.window))
             here = replace(here, path=clip.path(here, given))
         copies.append((former, here))
     grade = grade.having({("pick", pick.id): pick for _, pick in copies})
@@ -109,6 +127,7 @@ def with_picks(
         tuple(left_out),
         tuple(pick.id for former, pick in copies if former.window and not pick.window),
         tuple(uncorrected),
+        tuple(unseen),
         tuple(pick.id for former, pick in copies if former.matte and opened is None),
     )
     return with_mattes(grade, clip, [pick for _, pick in copies]), lost
@@ -128,6 +147,15 @@ def _found(
     elif pick.whole_hue or (same_clip and former.pixel is None):
         return pick
     return clip.at_home(pick, match.target.display())
+
+
+def _seen(clip: ClipOfPicks, pick: Pick) -> Pick:
+    """Return a pick with those areas and corrections alone whose frames can be read."""
+    return replace(
+        pick,
+        areas=tuple(area for area in pick.areas if clip.shows(area.frame)),
+        path=tuple(key for key in pick.path if not key.given or clip.shows(key.frame)),
+    )
 
 
 def in_place(clip: ClipOfPicks, pick: Pick, *, told: bool = True) -> Colour | None:
@@ -174,13 +202,13 @@ def _timed(match: Match, pick: Pick, frames: Sequence[int], *, same_clip: bool) 
 
     if isinstance(match.time, str):
         first, last, _ = match.target.frames
-        keys = {time(k.frame): k for k in pick.path if first <= match.back(k.frame) <= last}
+        keys = {time(k.frame): k for k in pick.path if round(match.back(k.frame)) in frames}
         frame = time(pick.frame)
         if first <= match.back(pick.frame) <= last:
             copy = replace(copy, rgb=colour(pick.rgb))
         else:  # it was picked at a frame that is not in the target
             copy = replace(picked_at(match.there(frame)), pixel=None, box=None)
-        inside = [area for area in copy.areas if first <= match.back(area.frame) <= last]
+        inside = [area for area in copy.areas if round(match.back(area.frame)) in frames]
         window = copy.window
         if window is not None:
             boxes = {round(match.back(key.frame)): key for key in window.keys}
@@ -199,7 +227,11 @@ def _timed(match: Match, pick: Pick, frames: Sequence[int], *, same_clip: bool) 
             path=tuple(replace(keys[f], frame=f, rgb=colour(keys[f].rgb)) for f in sorted(keys)),
         )
     moment = float(match.time)
-    start, until = (moment if end is None else end for end in (pick.start, pick.until))
-    if not start <= moment <= until:
+    strength = pick.strength_at(moment)
+    if strength == 0:
         return None
-    return replace(picked_at(moment), frame=match.target.frames[0])
+    still = replace(picked_at(moment), frame=match.target.frames[0])
+    if pick.to is None or strength == 1:
+        return still
+    within_a_ramp = pick.colour_at(moment) + strength * pick.change_at(moment)
+    return replace(still, to=colour(within_a_ramp))

@@ -4,7 +4,7 @@ Each handle of the target gets the colour that the source's grade makes of its c
 corresponding time. Stops are added where the change along an edge is not linear.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,10 +94,12 @@ def copied(
     time: Time = "relative",
     *,
     same_clip: bool = False,
+    unread: Collection[str] = (),
 ) -> tuple[Grade, Fit]:
     """Take over the grade of another palette (`Document.copy_from`); return also how it fits.
 
-    In palettes of the same clip picks stay where they were picked.
+    In palettes of the same clip picks stay where they were picked. `unread` has the ids of the
+    source's picks for which the clip was not read yet.
     """
     if source.path is not None and target.path is not None and same_file(source.path, target.path):
         raise Palette4dError(
@@ -110,7 +112,7 @@ def copied(
     state = dict(_handles(match, _grade(match, source.only(*HANDLES))))
     kept, _ = with_active_kept(target, "before copy")
     after = kept.with_state({**kept.of_kind("version", "note", "lock"), **state})
-    after, lost = with_picks(after, match, clip, same_clip=same_clip)
+    after, lost = with_picks(after, match, clip, same_clip=same_clip, unread=unread)
     label = f"copy the grade of {source.members['clip']['name']}"
     nothing = bool(lost.left_out) and not after.edited
     return after.labelled(label), replace(fit(after, source, time), lost=lost, nothing=nothing)

@@ -25,6 +25,7 @@ from palette4d.grade import (
     reanalysis,
     recolouring,
     sidecar,
+    unread_steps,
     versions,
 )
 from palette4d.grade.clip_of_picks import ClipOfPicks
@@ -509,8 +510,9 @@ class Document:
         """Take over the grade of another document, as one step.
 
         Each handle gets the colour that the other grade makes of its colour at the corresponding
-        time. Picks are learned again there. Active edits that no version holds are kept as the
-        version "before copy". If nothing of the grade is in this clip, the edits stay.
+        time. Picks stay as they are in palettes of the same pictures; in another clip they are
+        learned again. Active edits that no version holds are kept as the version "before copy". If
+        nothing of the grade is in this clip, the edits stay.
 
         Parameters
         ----------
@@ -534,7 +536,9 @@ class Document:
             The source has no edits, the frame is outside of its clip, or its colour space cannot be
             converted.
         """
-        after, fit = copying.copied(self.grade, source.grade, self._clip(clip), time)
+        unread = unread_steps.unread_picks(source.grade, source.history)
+        own = self._clip(clip)
+        after, fit = copying.copied(self.grade, source.grade, own, time, unread=unread)
         return fit if fit.nothing else self._made((after, fit))
 
     # ----------------------------------------------------------------------------------- pictures

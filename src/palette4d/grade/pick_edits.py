@@ -274,6 +274,8 @@ def change_pick(
                 f"`window {id} --frame T --box L,T,R,B`"
             )
         changes["window"] = replace(window, **of_window)
+    if changes.get("frame", old.frame) != old.frame:  # its place is one of the frame before
+        changes = {"pixel": None, "box": None, **changes}
     if changes.get("pixel") is not None and "rgb" not in changes:
         frame, box = changes.get("frame", old.frame), changes.get("box") or 1
         grade.check_frame(frame)

@@ -21,8 +21,10 @@ from palette4d.grade.correspondence import same_pictures
 from palette4d.grade.edits import RAMP_WORDS, Edit, Key, Kind, State, difference
 from palette4d.grade.grade import Grade
 from palette4d.grade.handle_edits import reset
+from palette4d.grade.history import History
 from palette4d.grade.members import Fields, history_of
 from palette4d.grade.sidecar import OnEdits, Saved
+from palette4d.grade.unread_steps import unread_picks
 from palette4d.grade.versions import save_version, set_note
 from palette4d.media.clip_files import files_of
 
@@ -113,17 +115,18 @@ def _copied(
     clip, notes = ClipOfPicks.of(new, given, target), []
     own, other = (grade.members["clip"] for grade in (new, former))
     time = _time(new, former)
+    unread = unread_picks(former, History(*history_of(members, str(target))))
     former = former.with_state(_scaled(former.state, _growth(own, other)))
     for name in former.versions:
         if (version := former.version(name)).edited:
-            new, fit = copied(new, version, clip, time, same_clip=True)
+            new, fit = copied(new, version, clip, time, same_clip=True, unread=unread)
             if lost := str(fit.lost):
                 notes.append(f"version {name}{lost}")
         new, _ = save_version(new, name)
         new = set_note(new, name, former.note(name))
         new = reset(new)
     if former.edited:
-        new, fit = copied(new, former, clip, time, same_clip=True)
+        new, fit = copied(new, former, clip, time, same_clip=True, unread=unread)
         fit = replace(fit, nothing=False)  # the former edits do not stay here
         notes.append(f"the palette changed, so that the grade was copied: {fit}")
     if locks := [id_ for kind, id_ in former.state if kind == "lock"]:
@@ -139,12 +142,13 @@ def _copied(
 def _time(new: Grade, former: Grade) -> Literal["relative", "same"]:
     """Return how the frames of a new analysis correspond to the former ones.
 
-    Clips that have numbers in common have these frames in common, unless the pictures tell that
-    they are numbered anew.
+    Clips that have numbers in common have these frames in common, unless the pictures or `--like`
+    tell that they are numbered anew.
     """
     (first, last, _), (begin, end, _) = new.frames, former.frames
     common = first <= end and begin <= last
-    return "same" if common and not same_pictures(new, former) else "relative"
+    corresponds = _is_moved(new) or same_pictures(new, former)
+    return "same" if common and not corresponds else "relative"
 
 
 def _with_same_handles(old: Grade, new: Grade, by: tuple[float, float]) -> Grade | None:
@@ -152,8 +156,7 @@ def _with_same_handles(old: Grade, new: Grade, by: tuple[float, float]) -> Grade
 
     `by` is how many times as wide and as high its clip is.
     """
-    method = new.members.get("quality", {}).get("options", {}).get("method")
-    moved_to_it = method == _MOVED and _handles(old.members) == _handles(new.members)
+    moved_to_it = _is_moved(new) and _handles(old.members) == _handles(new.members)
     if not moved_to_it and not sidecar.same_palette(old.members, new.members):
         return None
     moved = new.with_mattes(old.mattes).with_state(_scaled(old.state, by))
@@ -162,6 +165,12 @@ def _with_same_handles(old: Grade, new: Grade, by: tuple[float, float]) -> Grade
     except SidecarError:  # a handle has moved in time beyond an edit
         return None
     return moved
+
+
+def _is_moved(new: Grade) -> bool:
+    """Return whether a palette is an earlier one that `analyze --like` moved to its clip."""
+    options = new.members.get("quality", {}).get("options", {})
+    return bool(options.get("method") == _MOVED)
 
 
 def _growth(own: Fields, other: Fields) -> tuple[float, float]:

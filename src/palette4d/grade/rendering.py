@@ -18,10 +18,10 @@ from palette4d import _core
 from palette4d.common.files import make_folder
 from palette4d.common.message import Arg
 from palette4d.common.text import some_of
-from palette4d.grade import later
 from palette4d.grade.document import Document
 from palette4d.grade.movie_rendering import MoviePlan, rate_of
 from palette4d.grade.output import Output
+from palette4d.grade.unread_steps import unread_picks
 from palette4d.media import existing
 from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip import Clip, Image, open_clip
@@ -122,19 +122,12 @@ def mismatches(document: Document, clip: Clip, whole: bool) -> list[str]:
             f"{spans}, this clip has {describe(clip.frames)}; each frame takes the palette of its "
             "own number. Check that this is the clip you mean"
         )
-    if waiting := unread_picks(document):
+    if waiting := unread_picks(document.grade, document.history):
         notes.append(
             f"{some_of(waiting)} not yet followed through the clip, as a program ended too early: "
             "open the sidecar in Studio, which goes on"
         )
     return notes
-
-
-def unread_picks(document: Document) -> list[str]:
-    """Return the ids of enabled picks whose steps have not read the clip yet."""
-    steps = [step for _, _, step in later.unread(document.grade, document.history)]
-    ids = {change.id for step in steps for change in step.changes if change.kind == "pick"}
-    return [pick.id for pick in document.grade.picks if pick.enabled and pick.id in ids]
 
 
 @dataclass

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from palette4d.grade import edits, later
+from palette4d.grade import edits, later, unread_steps
 from palette4d.grade.document import Document, OfClip
 from palette4d.grade.edits import Edit
 from palette4d.grade.follow import Progress
@@ -86,7 +86,7 @@ class Follower:
         """Complete this edit, the newest one, when those before it are that it does not replace."""
         state, first = job.after.state, self._first
         self._jobs = deque(
-            each for each in self._jobs if not later.replaces(job.step, each.step, state)
+            each for each in self._jobs if not unread_steps.replaces(job.step, each.step, state)
         )
         self._jobs.append(job)
         if self._first is not first:

@@ -18,7 +18,7 @@ from typing import TypeVar
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.files import same_file
 from palette4d.common.folders import state_folder
-from palette4d.grade import edits, later
+from palette4d.grade import edits, later, unread_steps
 from palette4d.grade.document import Document, OfClip
 from palette4d.grade.edits import Edit as Step
 from palette4d.grade.follow import Progress
@@ -270,7 +270,7 @@ class Session(Drafts):
             changes = edits.difference(before.state, document.grade.state).undoable().changes
             if clip is None or not changes or document.history.done[-1].changes != changes:
                 return None
-            document.history = later.as_unread(document.history)
+            document.history = unread_steps.as_unread(document.history)
             return document.history.done[-1]
 
         step = self.edit(at_once, text)
@@ -293,9 +293,11 @@ class Session(Drafts):
             return []
         key = document.grade, document.history
         if any(a is not b for a, b in zip(key, self._looked_at, strict=True)):
-            self._looked_at, self._left = key, [*later.unread(*key)]
+            self._looked_at, self._left = key, [*unread_steps.unread(*key)]
         left = [step for _, _, step in self._left]
-        return sorted({pick.id for step in left for pick in later.readers(step, document.grade)})
+        return sorted(
+            {pick.id for step in left for pick in unread_steps.readers(step, document.grade)}
+        )
 
     def follow(self) -> None:
         """Read the clip for the picks that are `unfollowed`."""
@@ -304,7 +306,7 @@ class Session(Drafts):
             return
         self._follower.again(
             Job(None, clip.source, texts.FOLLOWED.format(step=step.label), before, after, step)
-            for before, after, step in later.unread(document.grade, document.history)
+            for before, after, step in unread_steps.unread(document.grade, document.history)
         )
 
     def complete(
