@@ -313,6 +313,24 @@ def test_edits_go_along_with_frames_that_like_numbers_anew(clip, tmp_path):
     assert (kept.frame, kept.start, kept.until) == (1005, 1004, 1005)
 
 
+@pytest.mark.parametrize("name", ["link.p4d.json", "grade", "s.P4D.JSON", ".hidden.p4d.json"])
+def test_the_former_file_has_its_name_from_any_sidecars(clip, tmp_path, name):
+    out, folder = tmp_path / name, tmp_path
+    if name == "link.p4d.json":
+        folder = tmp_path / "there"
+        folder.mkdir()
+        out.symlink_to(folder / "own.p4d.json")
+        (folder / "own.p4d.json").touch()
+    analyze = ["analyze", str(clip), "-o", str(out), "--quiet"]
+    assert main.main([*analyze, "--method", "static"]) == 0
+    assert main.main(["edit", str(out), "palette", "--by", "0.1", "0", "0"]) == 0
+    edited = out.read_bytes()
+    assert main.main([*analyze, "--keep-edits"]) == 0
+    (former,) = folder.glob("*.former.p4d.json")
+    assert former.read_bytes() == edited
+    assert Document.load(out).grade.settings
+
+
 def test_picks_of_a_picture_that_was_mirrored_are_told(clip, tmp_path, capsys):
     """It has the same palette, so that all edits stay as they are."""
     halves = np.where(np.arange(16)[None, :, None] < 8, [200, 40, 40], [90, 90, 95]).repeat(12, 0)

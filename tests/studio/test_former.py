@@ -144,8 +144,8 @@ def test_what_another_program_writes_meanwhile_stays(
     save = former.session.save
     running: list[subprocess.Popen[str]] = []
 
-    def save_first(now: float | None = None) -> bool:
-        done = save(now)
+    def save_first() -> bool:
+        done = save()
         if other == "edits at once":
             another_program_edits(sidecar)
         else:

@@ -99,7 +99,7 @@ def _of_analysis(args: argparse.Namespace) -> Needs | None:
     if args.detect_shots:
         files += _configs_of_shots(output)
         return Needs(Promise(output, ".json", below=True), [], args.clip, files, starts=True)
-    return Needs(Promise.of_file(output), [], args.clip, files)
+    return Needs(Promise.of_file(output, copies=".former"), [], args.clip, files)
 
 
 def _configs_of_shots(folder: Path) -> Iterator[Path]:

@@ -38,6 +38,7 @@ class Promise:
     below : whether folders in it belong to it.
     linked : the file itself, or that to which it is a link, whatever its name.
     replaces : which files that exist it may replace.
+    copies : beside `linked`, also names that begin with its name and this.
     """
 
     folder: Path
@@ -45,22 +46,30 @@ class Promise:
     below: bool = False
     linked: Path | None = None
     replaces: Literal["all", "the file itself", "none"] = "all"
+    copies: str = ""
 
     @classmethod
     def of_file(
-        cls, path: Path, replaces: Literal["all", "the file itself", "none"] = "the file itself"
+        cls,
+        path: Path,
+        replaces: Literal["all", "the file itself", "none"] = "the file itself",
+        copies: str = "",
     ) -> Promise:
         """Return the promise to write a file, or others of its kind beside it."""
         whole = path.name.endswith(".p4d.json")
         suffix = ".p4d.json" if whole else path.suffix or path.name
         with contextlib.suppress(Palette4dError, OSError):  # the write says so
-            return cls(path.parent, suffix, linked=files.link_target(path), replaces=replaces)
+            linked = files.link_target(path)
+            return cls(path.parent, suffix, linked=linked, replaces=replaces, copies=copies)
         return cls(path.parent, suffix, replaces=replaces)
 
     def holds(self, path: Path) -> bool:
         """Whether a file's path is among those that were promised."""
-        if self.linked is not None and path == self.linked.absolute():
-            return True
+        if self.linked is not None and path.parent == self.linked.absolute().parent:
+            copy = self.linked.name.removesuffix(".p4d.json") + self.copies
+            is_copy = path.name.startswith(copy) and path.name.endswith(".p4d.json")
+            if path.name == self.linked.name or (self.copies and is_copy):
+                return True
         if path.name.startswith(".") or not path.name.endswith(self.ending):
             return False
         own, there = os.path.realpath(self.folder), Path(os.path.realpath(path.parent))

@@ -107,7 +107,7 @@ def with_picks(
         if here is None:
             left_out.append(f"{pick.id} ({asked_text(pick)})")
             continue
-        stays = here.pixel is not None and here.pixel == pick.pixel
+        stays = here.pixel is not None and (here.frame, here.pixel) == (pick.frame, pick.pixel)
         if same_clip and former.pixel is not None and not stays:
             elsewhere.append(pick.id)
         # In a palette of one frame nothing could be followed.
