@@ -233,15 +233,18 @@ def test_a_new_analysis_does_not_replace_what_another_program_writes_meanwhile(
     assert path.read_bytes().endswith(b"\n\n")
 
 
-def test_edits_stay_with_the_same_handles(tmp_path: Path) -> None:
+@pytest.mark.parametrize("later", [0, 5, 1000])
+def test_edits_stay_with_the_same_handles(tmp_path: Path, later: int) -> None:
     path = tmp_path / "clip.p4d.json"
     document = Document(members("split"))
     seen = document.grade.palette(8).rgb.mean(axis=0).tolist()
     document.pick(frame=8, colour=seen, by=(0.2, 0, 0))
     document.save_version("picked")
     document.set("v1", rgb=(1, 0, 0))
+    document.stop("e1", frame=3, rgb=(0, 1, 0))
+    document.lock("v1")
     document.save(path)
-    moved = members("split")
+    moved = stretched(members("split"), 1, later)
     moved["edits"] = {"vertices": [], "stops": []}
     moved["quality"] = {"stages": [], "options": {"method": "like"}, "versions": {}}
     for vertex in moved["polytope"]["vertices"]:
@@ -251,13 +254,22 @@ def test_edits_stay_with_the_same_handles(tmp_path: Path) -> None:
     assert not new.notes
     found = Document.load(path)
     assert found.fields()["polytope"] == moved["polytope"]
-    assert found.grade.settings == document.grade.settings
-    assert found.history.done == document.history.done
-    assert found.grade.picks == document.grade.picks
+    stop = found.grade.settings["s1"]
+    assert (stop.edge, stop.frame) == ("e1", 3 + later)
+    kept = {**found.grade.settings, "s1": replace(stop, frame=3)}
+    assert kept == document.grade.settings
+    assert found.grade.locks == ("v1",)
+    assert [step.label for step in found.history.done] == [s.label for s in document.history.done]
+    assert found.grade.picks == (document.grade.pick("p1").shifted(later),)
     image = np.array(seen, dtype=np.float32)[None, None]
     for one in (found, found.version("picked")):
-        assert one.recolour(image, 8)[0, 0] == pytest.approx(np.add(seen, (0.2, 0, 0)), abs=0.02)
+        assert one.recolour(image, 8 + later)[0, 0] == pytest.approx(
+            np.add(seen, (0.2, 0, 0)), abs=0.02
+        )
     assert not (tmp_path / "clip.former.p4d.json").exists()
+    for _ in document.history.done:
+        found.undo()
+    assert not found.grade.edited
 
 
 def test_ids_of_a_palette_that_was_found_anew_say_nothing(tmp_path: Path) -> None:

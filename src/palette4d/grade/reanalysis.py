@@ -61,8 +61,9 @@ def save(
     extra = fields.get("extra") or before["extra"]
     places = any(pick.marks or pick.window for pick in former.picks)
     scaled = [_SCALED] if places and by != (1, 1) else []
-    if (moved := _with_same_handles(former, new, by)) is not None:
-        steps = [_scaled_steps(part, by) for part in history_of(before, str(target))]
+    later = new.frames[0] - former.frames[0]
+    if (moved := _with_same_handles(former, new, by, later)) is not None:
+        steps = [_moved_steps(part, by, later) for part in history_of(before, str(target))]
         kept_fields = {**moved.fields(*steps), "extra": extra}
         saved = sidecar.save(kept_fields, target, on_edits="drop", replaces=read)
         return saved, scaled + _misplaced(saved, target, clip)
@@ -116,7 +117,7 @@ def _copied(
     own, other = (grade.members["clip"] for grade in (new, former))
     time = _time(new, former)
     unread = unread_picks(former, History(*history_of(members, str(target))))
-    former = former.with_state(_scaled(former.state, _growth(own, other)))
+    former = former.with_state(_moved(former.state, _growth(own, other)))
     for name in former.versions:
         if (version := former.version(name)).edited:
             new, fit = copied(new, version, clip, time, same_clip=True, unread=unread)
@@ -151,15 +152,18 @@ def _time(new: Grade, former: Grade) -> Literal["relative", "same"]:
     return "same" if common and not corresponds else "relative"
 
 
-def _with_same_handles(old: Grade, new: Grade, by: tuple[float, float]) -> Grade | None:
+def _with_same_handles(
+    old: Grade, new: Grade, by: tuple[float, float], later: float
+) -> Grade | None:
     """Return the new palette with the old edits, if it is the old one or `--like` moved that to it.
 
-    `by` is how many times as wide and as high its clip is.
+    `by` is how many times as wide and as high its clip is, `later` by how much its frame numbers
+    are higher.
     """
     moved_to_it = _is_moved(new) and _handles(old.members) == _handles(new.members)
     if not moved_to_it and not sidecar.same_palette(old.members, new.members):
         return None
-    moved = new.with_mattes(old.mattes).with_state(_scaled(old.state, by))
+    moved = new.with_mattes(old.mattes).with_state(_moved(old.state, by, later))
     try:
         sidecar.validate(moved.fields())
     except SidecarError:  # a handle has moved in time beyond an edit
@@ -179,28 +183,32 @@ def _growth(own: Fields, other: Fields) -> tuple[float, float]:
     return width / before, height / high
 
 
-def _scaled(state: State, by: tuple[float, float]) -> dict[Key, Any]:
-    """Return a state whose picks have their places in a clip of another size."""
-    return {key: _scaled_value(key[0], value, by) for key, value in state.items()}
+def _moved(state: State, by: tuple[float, float], later: float = 0) -> dict[Key, Any]:
+    """Return a state in a clip of another size, and of other frame numbers."""
+    return {key: _moved_value(key[0], value, by, later) for key, value in state.items()}
 
 
-def _scaled_value(kind: Kind, value: Any, by: tuple[float, float]) -> Any:
-    if value is None or by == (1, 1):
+def _moved_value(kind: Kind, value: Any, by: tuple[float, float], later: float) -> Any:
+    if value is None or (by == (1, 1) and later == 0):
         return value
     if kind == "version":
-        return _scaled(value, by)
-    return value.scaled(*by) if kind == "pick" else value
+        return _moved(value, by, later)
+    if kind == "handle" and value.frame is not None:
+        return replace(value, frame=value.frame + later)
+    if kind == "pick":
+        return (value if by == (1, 1) else value.scaled(*by)).shifted(later)
+    return value
 
 
-def _scaled_steps(steps: Iterable[Edit], by: tuple[float, float]) -> list[Edit]:
+def _moved_steps(steps: Iterable[Edit], by: tuple[float, float], later: float) -> list[Edit]:
     return [
         replace(
             step,
             changes=tuple(
                 replace(
                     change,
-                    before=_scaled_value(change.kind, change.before, by),
-                    after=_scaled_value(change.kind, change.after, by),
+                    before=_moved_value(change.kind, change.before, by, later),
+                    after=_moved_value(change.kind, change.after, by, later),
                 )
                 for change in step.changes
             ),
@@ -210,12 +218,13 @@ def _scaled_steps(steps: Iterable[Edit], by: tuple[float, float]) -> list[Edit]:
 
 
 def _handles(document: Fields) -> tuple[Any, ...]:
-    """Return the ids, topology, frames and encoding that edits refer to."""
+    """Return the ids, topology, length and encoding that edits refer to."""
     polytope, frames = document["polytope"], document["clip"]["frames"]
     vertices = {vertex["id"] for vertex in polytope["vertices"]}
     edges = {(edge["id"], edge["from"], edge["to"]) for edge in polytope["edges"]}
     faces = [block["faces"] for block in polytope["blocks"]]
-    return vertices, edges, faces, frames["first"], frames["last"], document["clip"]["encoding"]
+    length = frames["last"] - frames["first"]
+    return vertices, edges, faces, length, document["clip"]["encoding"]
 
 
 def _former(target: Path, content: bytes) -> Path:
