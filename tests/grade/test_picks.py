@@ -118,6 +118,37 @@ def test_readings_are_taken_by_the_pick_that_they_are_of() -> None:
     assert with_readings({}, readings) == {}
 
 
+def test_a_step_that_was_undone_and_forgotten_leaves_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It was undone while the clip was read, and another step was made then."""
+    document = moving(monkeypatch)
+    document.pick(0, pixel=(20, 30), box=9, to="#2040b0")
+    document.hold(0, pixel=(60, 8), box=9)
+    before = document.grade
+    document.add_area("p1", Area(0, ((60, 50),), 3), clip=later.Unread())
+    document.history = unread_steps.as_unread(document.history)
+    made, step = document.grade, document.history.done[-1]
+    trial = Document(before)
+    later.do_again(trial, step, ClipOfPicks.of(before), None)
+    readings = later.readings_of(trial.grade, made)
+    assert readings
+    steps = step, trial.history.done[-1]
+    document.undo()
+    document.adjust(by=(0.1, 0, 0))
+    grade, history = later.completed(document.grade, document.history, steps, readings, {})
+    assert grade.state == document.grade.state
+    assert history == document.history
+    # A step that was merged with others is there, if what it read for is.
+    document = Document(before)
+    with document.one_step("both"):
+        document.add_area("p1", Area(0, ((60, 50),), 3), clip=later.Unread())
+        document.adjust(by=(0.1, 0, 0))
+    mattes = trial.grade.mattes
+    grade, _ = later.completed(document.grade, document.history, steps, readings, mattes)
+    assert grade.pick("p1").matte == trial.grade.pick("p1").matte != before.pick("p1").matte
+
+
 def test_a_window_that_was_followed_meanwhile_keeps_its_feather() -> None:
     given, followed = WindowKey(0, (1, 1, 5, 5), True), WindowKey(3, (2, 1, 6, 5))
     old = Pick("p1", "pick", 0, GREY, (0.6, 0.5, 0.5), window=Window(2, (given,)))

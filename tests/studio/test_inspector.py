@@ -15,6 +15,7 @@ os.environ["QT_QPA_PLATFORM"] = "offscreen"
 pytest.importorskip("PySide6", reason="the extra palette4d[studio] is not installed")
 
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from palette4d.cli.main import main
@@ -91,6 +92,18 @@ def test_a_wrong_hex_is_said_and_changes_nothing(panel: Inspector) -> None:
     assert panel.session.status.level == "error"
     assert colour(panel) == (0.9, 0.1, 0.1)
     assert panel.hex.text() == "#e61a1a"
+
+
+def test_what_is_typed_stays_while_other_things_change(panel: Inspector) -> None:
+    """As when another program edits, or a pick was followed."""
+    panel.activateWindow()
+    panel.hex.setFocus()
+    panel.hex.selectAll()
+    QTest.keyClicks(panel.hex, "#33")
+    panel.session.edit(lambda document: document.set("v3", rgb=(0.1, 0.2, 0.3)))
+    assert panel.hex.text() == "#33"
+    panel.session.select("v3")
+    assert panel.hex.text() == "#1a334c"
 
 
 def test_a_drag_on_the_wheel_turns_the_hue_as_one_step(qtbot: Any, panel: Inspector) -> None:

@@ -18,8 +18,9 @@ from palette4d.grade.answer import Answer, Note
 from palette4d.grade.document import Document
 from palette4d.grade.picks import Area, WindowKey
 from palette4d.grade.picks import Window as PickWindow
-from palette4d.studio import texts
+from palette4d.studio import grade_steps, texts
 from palette4d.studio.pick_window import REST, WindowRows
+from palette4d.studio.pixels import place_between
 from palette4d.studio.timeline_menu import menu_for
 from palette4d.studio.window import Window
 
@@ -181,7 +182,7 @@ def test_numbers_are_typed_as_one_step(rows: WindowRows, qtbot: Any) -> None:
     assert box_of(rows) == [left, top, right, bottom]
 
 
-@pytest.mark.parametrize("then", ["feather", "invert", "undo", "save", "colour", "close"])
+@pytest.mark.parametrize("then", ["feather", "invert", "undo", "save", "colour", "close", "hold"])
 def test_typed_numbers_are_kept_before_what_is_done_next(
     rows: WindowRows, then: str, qtbot: Any
 ) -> None:
@@ -207,6 +208,14 @@ def test_typed_numbers_are_kept_before_what_is_done_next(
     elif then == "colour":
         session.drag(lambda document: document.adjust(by=(0.1, 0, 0)))
         session.drop()
+    elif then == "hold":
+        place = place_between(session, (5, 5), (5, 5))
+        assert place is not None
+        grade_steps.hold(session, place)
+        qtbot.waitUntil(lambda: not session.following, timeout=30_000)
+        assert session.document is not None
+        (hold,) = (pick for pick in session.document.grade.picks if pick.kind == "hold")
+        assert hold.matte is not None
     else:
         session.close()
         (pick,) = Document.load(path).grade.picks

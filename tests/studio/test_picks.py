@@ -594,6 +594,68 @@ def test_the_end_of_a_range_is_dragged(qtbot: Any, opened: Window) -> None:
     assert picks(opened)[0].start is None
 
 
+def test_escape_takes_back_what_the_pointer_does_until_it_is_let_go(
+    qtbot: Any, opened: Window
+) -> None:
+    pick(qtbot, opened, 40, 30)
+    timeline, session, wheel = opened.timeline, opened.session, opened.inspector.wheel
+    assert session.document is not None
+    state, steps = session.document.grade.state, len(session.document.history.done)
+    _, last, _ = session.frames
+    y = timeline.places.lane_y(0)
+    ends = [QPointF(timeline.places.x_of(frame), y) for frame in (last, last - 3)]
+    middle = QPointF(wheel.rect().center())
+    colours = [middle + QPointF(20, 0), middle + QPointF(0, 25)]
+    area = [at(opened, x, 20) for x in (70, 110)]
+    for part, places, keys in (
+        (timeline, ends, Qt.KeyboardModifier.NoModifier),
+        (wheel, colours, Qt.KeyboardModifier.NoModifier),
+        (opened.viewer, area, Qt.KeyboardModifier.ShiftModifier),
+    ):
+        session.select("p1")
+        qtbot.mousePress(part, LEFT, keys, places[0].toPoint())
+        send(part, places[1], keys)
+        opened.commands.cancel()
+        send(part, places[0], keys)
+        send(part, places[1], keys)
+        assert session.document.grade.state == state
+        qtbot.mouseRelease(part, LEFT, keys, places[1].toPoint())
+        assert session.document.grade.state == state
+    assert len(session.document.history.done) == steps
+    assert timeline.places.dragged is None
+    session.select("p1")
+    qtbot.mouseClick(wheel, LEFT, pos=colours[1].toPoint())  # the next one does it
+    assert session.document.grade.state != state
+
+
+def test_a_colour_that_is_dragged_while_the_playhead_moves_is_kept(
+    qtbot: Any, opened: Window
+) -> None:
+    session, wheel = opened.session, opened.inspector.wheel
+    qtbot.mouseClick(opened.viewer, LEFT, pos=at(opened, 40, 30).toPoint())
+    frame, centre = session.frame, wheel.rect().center()
+    qtbot.mousePress(wheel, LEFT, pos=centre + QPoint(20, 0))
+    session.go(frame + 1)
+    opened.inspector.refresh()
+    qtbot.mouseRelease(wheel, LEFT, pos=centre + QPoint(20, 0))
+    assert not session.dragging
+    (made,) = picks(opened)
+    assert made.frame == frame
+
+
+def test_a_number_that_is_not_entered_yet_is_saved(qtbot: Any, opened: Window) -> None:
+    pick(qtbot, opened, 40, 30)
+    field = opened.inspector.hex
+    opened.activateWindow()
+    field.setFocus()
+    field.selectAll()
+    qtbot.keyClicks(field, "#336699")
+    opened.files.save()
+    assert opened.session.path is not None
+    (kept,) = palette4d.load(opened.session.path).grade.picks
+    assert kept.to == pytest.approx((0.2, 0.4, 0.6), abs=2e-3)
+
+
 def test_keys_set_the_range_at_the_playhead(qtbot: Any, opened: Window) -> None:
     pick(qtbot, opened, 40, 30)
     session = opened.session

@@ -60,6 +60,15 @@ def test_of_colours_that_are_equal_there_the_selected_one_changes(document: Docu
             assert red == [id_]
 
 
+def test_a_row_at_its_end_is_its_vertex_once(document: Document) -> None:
+    edge = document.grade.handles.edges["e1"]
+    start, frame = edge["from"], document.grade.handles.vertices[edge["from"]]["frame"]
+    before = np.array(document.grade.colour(start))
+    new = (before + 0.1).tolist()
+    Recolour(target(document, start, frame), (start, "e1"), frame, tuple(new))(document)
+    assert document.grade.colour(start) == pytest.approx(new)
+
+
 def test_several_handles_move_by_the_same_offset_in_one_step(document: Document) -> None:
     before = {id_: np.asarray(document.grade.colour(id_)) for id_ in ("v4", "s1")}
     edge = np.asarray(document.grade.colour("e1", frame=3.0))

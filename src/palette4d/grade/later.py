@@ -104,7 +104,8 @@ def completed(
     """Return a grade and its steps where a step has what the clip says.
 
     `steps` are the step that was made at once, and that of the same edit with the clip. The first
-    may be done or undone; without it in the history, the readings become a step of their own.
+    may be done or undone. Without it in the history, the readings become a step of their own, if
+    the state has what it made: else it was undone, and is forgotten.
     `mattes` are the texts of the learned mattes by id.
     """
     grade, (step, like) = grade.with_mattes(mattes), steps
@@ -112,6 +113,8 @@ def completed(
     index = max((k for k, each in enumerate(line) if same(each, step)), default=None)
     is_done = index is None or index < done
     now = (with_readings if is_done else _versions)(grade.state, readings)
+    if index is None and not any(_has(grade.state, change) for change in step.changes):
+        return grade, history
     if index is None:  # merged with other steps, when another program wrote the file
         keys = {change.key for change in step.changes}
         done_now = [
@@ -135,6 +138,14 @@ def completed(
     kept = [each for each in line[:done] if each.changes]
     undone = [each for each in line[done:] if each.changes]
     return grade.with_state(now, grade.label), History(tuple(kept), tuple(reversed(undone)))
+
+
+def _has(state: State, change: Change) -> bool:
+    """Return whether a state has a change of a pick, as far as that is read for."""
+    own, made = state.get(change.key), change.after
+    if change.kind != "pick" or own is None or made is None:
+        return change.kind == "pick" and own is made
+    return all(getattr(own, name) == getattr(made, name) for name in _INPUTS)
 
 
 def with_readings(state: State, readings: Readings) -> dict[Key, Any]:

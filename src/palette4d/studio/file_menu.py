@@ -181,11 +181,13 @@ class FileMenu:
 
     def save(self) -> None:
         """Save now."""
+        self.window.enter_typed()
         if self.session.save():
             self.session.say(texts.SAVED_NOW)
 
     def save_as(self) -> None:
         """Save under another name."""
+        self.window.enter_typed()
         start = str(self.session.path or "")
         path, _ = QFileDialog.getSaveFileName(
             self.window, texts.SAVE_TITLE, start, texts.SIDECAR_FILTER

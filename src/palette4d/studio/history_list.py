@@ -90,6 +90,7 @@ class History(QWidget):
 
     def go_to(self, row: int) -> None:
         """Undo or redo up to a row; row 0 is before the first step."""
+        self.session.keep_typed()
         document = self.session.document
         if document is None:
             return

@@ -66,6 +66,7 @@ class Inspector(QWidget):
         self.target: Target | None = None
         self._tried: tuple[float, ...] = ()  # the colour that a drag shows
         self._settled: Target | None = None  # the target without the edit of a drag
+        self._hex_of = ""  # what the hex code is of
         self._lch: tuple[str, Lch] | None = None
         self.panel, self.picks = PickPanel(session), PickList(session)
         self._make()
@@ -304,7 +305,10 @@ class Inspector(QWidget):
         convert = (lch, self.shown, (self._lch and self._lch[0], self.session.looked))
         self.wheel.show_colour(now, origin, [lch.of(o.after) for o in others], convert)
         self._show_bars(now, origin, target)
-        self.hex.setText(hex_of(self.in_clip(target.after).tolist()).rstrip("*"))
+        typing = self.hex.hasFocus() and self.hex.isModified() and self._hex_of == target.id
+        if not typing:
+            self.hex.setText(hex_of(self.in_clip(target.after).tolist()).rstrip("*"))
+        self._hex_of = target.id
         self.shown_hex.setText(f"{texts.ON_SCREEN} #{bytes(after.tolist()).hex()}")
 
     def _show_bars(self, now: F64, origin: F64, target: Target) -> None:
@@ -408,7 +412,7 @@ class Inspector(QWidget):
         if target is None or target.place is None:
             self.session.drop()
             return
-        if self.target is None or not self.session.dragging:
+        if not self.session.dragging:
             return
         place, to = target.place, self._tried
 

@@ -96,7 +96,7 @@ class MenuActions:
 
     def cancel(self) -> None:
         """Forget a drag; else select nothing."""
-        if self.session.dragging:
+        if self.session.dragging or self.session.held:
             self.session.cancel()
         elif self.session.tool:
             self.session.take("")

@@ -55,6 +55,8 @@ class Session(Drafts):
         How code values of the clip become colours on the screen.
     revision : int
         Rises with every change of what `document` shows.
+    held, waived : bool
+        A button of the pointer is down where it drags; Escape took back what it does until then.
     """
 
     def __init__(self) -> None:
@@ -64,6 +66,7 @@ class Session(Drafts):
         self._trial: Document | None = None
         self._dragged: tuple[Edit, str] | None = None
         self._typed: Callable[[], object] | None = None  # keeps a drag that no pointer holds
+        self.held = self.waived = False
         self._copy: Path | None = None  # has the edits that could not be saved
         self._real = Path()  # where links led when the file was opened: its disk may go
         self._stamp: tuple[int, int, int] | None = None
@@ -259,6 +262,7 @@ class Session(Drafts):
 
         `then` gets the operation's result. `unread` has what is known of the clip.
         """
+        self.keep_typed()
         document, clip = self._document, self.clip
         if document is None:
             return
@@ -337,6 +341,8 @@ class Session(Drafts):
 
         `typed` does one that no pointer holds: soon, but before any other edit or save.
         """
+        if typed is None and self.held and self.waived:
+            return
         if typed is None:
             self.keep_typed()
         self._show(operation, text)
@@ -366,8 +372,8 @@ class Session(Drafts):
             self.edit(*self._dragged)
 
     def cancel(self) -> None:
-        """Forget the edit that is being dragged."""
-        self._typed = None
+        """Forget the edit that is being dragged, also if the pointer moves on."""
+        self._typed, self.waived = None, self.held
         if self._dragged is not None:
             self._trial = self._dragged = None
             self._changed()

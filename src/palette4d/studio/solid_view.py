@@ -299,8 +299,7 @@ class SolidView(QWidget):
             self.zoom = float(
                 np.clip(self.zoom * (0.85 if key == Qt.Key.Key_Minus else 1 / 0.85), 0.5, 12)
             )
-        elif key == Qt.Key.Key_Escape and self.session.dragging:
-            self._drag = None
+        elif key == Qt.Key.Key_Escape and (self.session.dragging or self.session.held):
             self.session.cancel()
         else:
             super().keyPressEvent(event)

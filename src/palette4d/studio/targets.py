@@ -121,12 +121,15 @@ class Recolour:
         many: contextlib.AbstractContextManager[None] = contextlib.nullcontext()
         if len(self.ids) > 1:
             many = document.one_step(f"set {' '.join(self.ids)}")
+        done = set[str]()
         with many:
             for id_ in self.ids or (self.target.id,):
                 target = target_of(document, id_, self.playhead)
-                if target is None:
+                if target is None or target.id in done:  # at its end a row is its vertex
                     continue
-                new = self.rgb if id_ == self.target.id else (target.after + by).tolist()
+                done.add(target.id)
+                own = target.id == self.target.id
+                new = self.rgb if own else (target.after + by).tolist()
                 if target.kind == "edge":
                     old, at = target.after.tolist(), target.frame
                     document.set_near(old, frame=at, id=target.id, rgb=new, any_value=True)

@@ -250,6 +250,9 @@ class TimelineView(QWidget):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Drag, or tell what is under the pointer."""
         at, press = event.position(), self._press
+        if self.session.waived:
+            self._press = press = self.painter.box = self.painter.told = self.places.dragged = None
+            self.update()
         if press is None:
             self._hover(at)
             return
@@ -309,10 +312,11 @@ class TimelineView(QWidget):
         pick = next((pick for pick, _ in self.places.lanes() if pick.id == hit.id), None)
         if pick is None:
             return
+        self.places.dragged = None  # one end, or its fade: not what was dragged before Ctrl
         _, start, until, _ = self.places.reach(pick)
         frame = self.places.frame_at(x)
         first = hit.grip in ("start", "fade in")
-        fades = list(pick.fades if self.places.dragged is None else self.places.dragged[3:])
+        fades = list(pick.fades)
         wide = max(start - frame if first else frame - until, 0.0)
         fades_alone = fade or hit.grip.startswith("fade")
         if fades_alone:
@@ -363,6 +367,8 @@ class TimelineView(QWidget):
         """End a drag."""
         press, self._press, self.painter.box = self._press, None, None
         self.painter.told = None
+        if self.session.waived:
+            press = self.places.dragged = None
         if press is not None and press.hit.grip and press.moved:
             self._keep_range()
         if press is not None and press.hit.stop and press.moved:
@@ -517,8 +523,7 @@ class TimelineView(QWidget):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Escape stops a drag, or selects nothing."""
         if event.key() == Qt.Key.Key_Escape:
-            if self.session.dragging:
-                self._press = None
+            if self.session.dragging or self.session.held:
                 self.session.cancel()
             else:
                 self.session.select()

@@ -424,6 +424,8 @@ class Viewer(QWidget):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Go on with what the button does; else probe."""
         point = self.pointer = event.position()
+        if self.session.waived and self.doing:
+            self._waive()
         self.cross.hide_for_pointer()
         if self.doing == "pan" and self.press is not None:
             if self.zoom is None:
@@ -460,6 +462,8 @@ class Viewer(QWidget):
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """End a pan or a drag of a window; make a pick or a hold."""
+        if self.session.waived:
+            self._waive()
         doing, press, self.doing, self.press = self.doing, self.press, "", None
         if doing == "pan":
             self.refresh()
@@ -473,6 +477,11 @@ class Viewer(QWidget):
         if doing in ("pick", "box", "handle") and press is not None:
             hold = event.modifiers() & HOLD_KEYS or self.session.tool == "hold"
             self._click(press, event.position() if doing == "box" else press, hold=bool(hold))
+        self.update()
+
+    def _waive(self) -> None:
+        """Forget what the button does."""
+        self.doing, self.press, self.stroke = "", None, []
         self.update()
 
     def _click(self, start: QPointF, end: QPointF, *, hold: bool) -> None:

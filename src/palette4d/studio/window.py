@@ -40,6 +40,7 @@ from shiboken6 import isValid
 from palette4d.common.errors import Palette4dError
 from palette4d.studio import menu_entries, texts
 from palette4d.studio.banner import Banner
+from palette4d.studio.colour_widgets import Keyed
 from palette4d.studio.file_menu import FileMenu
 from palette4d.studio.help_menu import HelpMenu
 from palette4d.studio.history_list import History
@@ -49,6 +50,7 @@ from palette4d.studio.menu_actions import MenuActions
 from palette4d.studio.menu_entries import ACTIONS, Action
 from palette4d.studio.no_objects import refuse_objects
 from palette4d.studio.paths import sequence_of
+from palette4d.studio.pointer import Pointer
 from palette4d.studio.preferences import DISPLAY
 from palette4d.studio.scopes_view import Scopes
 from palette4d.studio.session import Session
@@ -141,6 +143,8 @@ class Window(QMainWindow):
             button.setToolTip(f"{action.text()} ({keys})")
         for event in ("document", "status", "clip", "selection", "view", "playing"):
             session.on(event, self._show, panel=True)
+        dragged = (self.viewer, self.solid, self.timeline, *self.findChildren(Keyed))
+        self._pointer = Pointer(session, dragged)
         session.on("selection", self._bring_inspector)
         app = QApplication.instance()
         assert isinstance(app, QApplication)
@@ -217,6 +221,13 @@ class Window(QMainWindow):
         line_of(field).setModified(False)
         if field.hasFocus():  # by Enter, not because the keyboard went elsewhere
             self.viewer.setFocus()
+
+    def enter_typed(self) -> None:
+        """Enter what was typed in the field that has the keyboard."""
+        field = self.focusWidget()
+        if isinstance(field, QAbstractSpinBox | QLineEdit):
+            field.clearFocus()
+        self.session.keep_typed()
 
     def event(self, event: QEvent) -> bool:
         """Leave the space bar to a button that has the keyboard: else it plays."""
@@ -465,7 +476,7 @@ class Window(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Save; if that fails, ask before anything is lost. Edits that read the clip come first."""
-        self.session.keep_typed()
+        self.enter_typed()
         if self.session.following and not self._closing:
             self._closing = True
             self.session.say(texts.CLOSES_SOON, "warning")
