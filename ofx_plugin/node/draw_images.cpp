@@ -31,13 +31,12 @@ std::vector<float> mask_of(const Image& mask, const OfxRectI& rows) {
     return shares;
 }
 
-/// Whether its rows can be read as floats where they are: hosts may put rows at any byte.
+}  // namespace
+
 bool is_aligned(const Image& image) {
     const auto place = reinterpret_cast<std::uintptr_t>(image.data);
     return (place | static_cast<std::uintptr_t>(image.row_bytes)) % alignof(float) == 0;
 }
-
-}  // namespace
 
 void draw(const Image& in, const Image& out, const OfxRectI& area, const NodeDrawing& drawing) {
     const DrawingOptions& options = drawing.options;

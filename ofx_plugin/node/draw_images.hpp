@@ -12,6 +12,9 @@ struct NodeDrawing : Drawing {
     const Image* mask = nullptr;
 };
 
+/// Whether its rows can be read as floats where they are: hosts may put rows at any byte.
+bool is_aligned(const Image& image);
+
 /// Draws the part of `area` that `in` covers; the rest becomes transparent black. Both images have
 /// the same format, with three or four channels.
 void draw(const Image& in, const Image& out, const OfxRectI& area, const NodeDrawing& drawing);

@@ -16,6 +16,7 @@
 
 #include "clip_image.hpp"
 #include "describe.hpp"
+#include "draw_images.hpp"
 #include "frame_setup.hpp"
 #include "gpu_render.hpp"
 #include "instance.hpp"
@@ -142,7 +143,7 @@ std::shared_ptr<const CleanUp> cleaned_up(const Suites& suites, const Image& in,
         drawing, {in.channels, in.premultiplied}, clean_up_place(in, window, scale, drawing));
     if (!clean_up) return nullptr;
     const auto read = [&](int y, int x1, int x2, float* space) -> const float* {
-        if (in.depth == Depth::kFloat) return reinterpret_cast<const float*>(in.at(x1, y));
+        if (in.depth == Depth::kFloat && is_aligned(in)) return reinterpret_cast<const float*>(in.at(x1, y));
         read_floats(in, {x1, y, x2, y + 1}, space);
         return space;
     };

@@ -748,3 +748,15 @@ def test_windows_asks_no_server_that_only_a_file_names(
         assert files.names_a_server(path, Path("C:/"))
         with pytest.raises(Palette4dError, match="the sidecar names"):
             config_of_sidecar(path, "--ocio-config")
+
+
+def test_a_file_is_the_same_while_it_is_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another program renames a new file to it between two looks."""
+    path = tmp_path / "a"
+    path.touch()
+    monkeypatch.setattr(Path, "samefile", lambda *_: False)
+    assert files.same_file(path, path)
+    monkeypatch.chdir(tmp_path)
+    assert files.same_file(Path("a"), path)

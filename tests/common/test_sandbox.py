@@ -294,6 +294,38 @@ def script(tmp_path: Path, *lines: str, replaces: str = "the file itself") -> su
     )
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no sandbox")
+def test_the_home_of_another_user_is_not_opened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the superuser decodes a clip of theirs."""
+    import pwd
+
+    monkeypatch.setattr(sandbox.Path, "home", lambda: tmp_path / "root")
+    theirs = tmp_path / "bob"
+    theirs.mkdir()
+    (theirs / "a.png").touch()
+    assert list(sandbox.parts(theirs, {"png"})) == [theirs]
+    bob = pwd.struct_passwd(("bob", "x", 1001, 1001, "", str(theirs), ""))
+    monkeypatch.setattr(pwd, "getpwall", lambda: [bob])
+    assert list(sandbox.parts(theirs, {"png"})) == [Path(os.path.realpath(theirs / "a.png"))]
+    assert list(sandbox.parts(tmp_path, {"png"})) == []
+
+
+def test_a_promise_of_folders_has_no_hidden_ones(tmp_path: Path) -> None:
+    (tmp_path / ".vscode").mkdir()
+    (tmp_path / "below").mkdir()
+    below = writer.Promise(tmp_path, ".p4d.json", below=True)
+    assert below.holds(tmp_path / "below" / "a.p4d.json")
+    assert below.holds(tmp_path / "a.p4d.json")
+    shots = writer.Promise(tmp_path, (".p4d.json", ".shots.json"))
+    assert shots.holds(tmp_path / "a.shots.json")
+    for promise in (below, shots):
+        for name in (".vscode/a.p4d.json", "tasks.json", ".a.p4d.json", "../a.p4d.json"):
+            assert not promise.holds(tmp_path / name)
+    assert not shots.holds(tmp_path / "below" / "a.p4d.json")
+
+
 @forks
 def test_the_writer_refuses_what_the_command_was_not_begun_for(tmp_path: Path) -> None:
     (tmp_path / "link.mov").symlink_to(tmp_path / "secret")

@@ -149,6 +149,43 @@ def test_a_step_that_was_undone_and_forgotten_leaves_nothing(
     assert grade.pick("p1").matte == trial.grade.pick("p1").matte != before.pick("p1").matte
 
 
+def test_versions_that_are_kept_meanwhile_have_what_is_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Those that have the pick, also changed since; not what it was with an area since undone."""
+    document, where = moving(monkeypatch), {"pixel": (20, 30), "box": 9, "to": "#2040b0"}
+    before = document.grade
+    document.pick(0, **where)
+    read, colour = document.grade, document.grade.pick("p1").rgb
+    done = document.history.done[-1]
+    document = Document(before)
+    document.save_version("before")
+    document.pick(0, **where, clip=later.Unread(colour))
+    made, step = document.grade, document.history.done[-1]
+    document.change_pick("p1", reach=2.0)
+    document.save_version("changed")
+    readings = later.readings_of(read, made)
+    steps = step, done
+    grade, _ = later.completed(document.grade, document.history, steps, readings, read.mattes)
+    (kept,) = grade.version("changed").picks
+    assert (kept.path, kept.matte) == (read.pick("p1").path, read.pick("p1").matte)
+    assert kept.reach == 2
+    assert grade.version("before").picks == ()
+    document = Document(read)
+    document.hold(0, pixel=(60, 8), box=9)
+    both = document.grade
+    document.add_area("p1", Area(0, ((60, 50),), 3), clip=later.Unread())
+    made, step = document.grade, document.history.done[-1]
+    trial = Document(both)
+    later.do_again(trial, step, ClipOfPicks.of(both), None)
+    document.undo()
+    document.save_version("without")
+    readings = later.readings_of(trial.grade, made)
+    steps, mattes = (step, trial.history.done[-1]), trial.grade.mattes
+    grade, _ = later.completed(document.grade, document.history, steps, readings, mattes)
+    assert grade.version("without").picks == both.picks
+
+
 def test_a_window_that_was_followed_meanwhile_keeps_its_feather() -> None:
     given, followed = WindowKey(0, (1, 1, 5, 5), True), WindowKey(3, (2, 1, 6, 5))
     old = Pick("p1", "pick", 0, GREY, (0.6, 0.5, 0.5), window=Window(2, (given,)))

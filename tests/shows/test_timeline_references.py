@@ -7,6 +7,7 @@ import copy
 import json
 import shutil
 import sys
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import pytest
 from edits import clip, dissolve, external, gap, movie, save, timeline
 
 from palette4d.cli import main
+from palette4d.common.errors import Palette4dError
 from palette4d.shows import timeline_references
 
 #: A palette that does not change: these tests are about timelines.
@@ -302,6 +304,16 @@ class TestSeries:
         assert export(show, "-o", "luts") == 1
         assert "none of its 3 shots is analysed" in capsys.readouterr().err
         assert not Path("luts").exists()
+
+
+def test_a_timeline_whose_readers_would_disagree_is_refused(show: Path, tmp_path: Path) -> None:
+    """OpenTimelineIO reads the first of two members of one name, and others the last."""
+    text = (tmp_path / "edit.otio").read_text()
+    twice = tmp_path / "twice.otio"
+    twice.write_text(text.replace('"name"', '"name": "another",\n"name"', 1))
+    otio.adapters.read_from_file(str(twice))
+    with pytest.raises(Palette4dError, match="two members 'name'"):
+        timeline_references._document(twice, Fraction(24))
 
 
 def test_a_config_has_a_look_a_shot(show: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -53,7 +53,7 @@ bool is_empty(const Area& a) { return a.x1 >= a.x2 || a.y1 >= a.y2; }
 
 /// The cells [first, second) that pixels x1 to x2 are in.
 std::pair<int, int> cells_of(std::int64_t x1, std::int64_t x2, int cell) {
-    return {static_cast<int>(floored(x1, cell)), static_cast<int>(floored(x2 - 1, cell)) + 1};
+    return {static_cast<int>(floored(x1, cell)), static_cast<int>(floored(x2 - 1, cell) + 1)};
 }
 
 /// Calls each(slot, pixel) for the pixels of a block, from its first to its last.

@@ -95,10 +95,13 @@ def _of_analysis(args: argparse.Namespace) -> Needs | None:
     output = Path(args.output)
     files = files_of_config(args.ocio_config or os.environ.get("OCIO") or "")
     files += [output, *sandbox.parts(output if args.detect_shots else output.parent, SIDECARS)]
+    if output.is_symlink():  # the former files lie beside the one that it leads to
+        files += sandbox.parts(Path(os.path.realpath(output)).parent, SIDECARS)
     files += [] if args.like is None else [args.like]
     if args.detect_shots:
         files += _configs_of_shots(output)
-        return Needs(Promise(output, ".json", below=True), [], args.clip, files, starts=True)
+        writes = Promise(output, (".p4d.json", ".shots.json"))
+        return Needs(writes, [], args.clip, files, starts=True)
     return Needs(Promise.of_file(output, copies=".former"), [], args.clip, files)
 
 

@@ -97,6 +97,8 @@ def make_folder(folder: Path) -> None:
 
 def same_file(a: Path, b: Path) -> bool:
     """Return whether two paths lead to one file."""
+    if a.absolute() == b.absolute():  # not two looks, with a rename by another program between them
+        return True
     try:
         return a.samefile(b)
     except OSError:  # one is not there

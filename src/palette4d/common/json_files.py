@@ -85,6 +85,18 @@ def parse(data: bytes) -> Any:
     return value
 
 
+def with_unique_names(members: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the members of an object, for `json`; ValueError if two have one name.
+
+    Of such two, readers take the first or the last.
+    """
+    found = dict(members)
+    if len(found) < len(members):
+        names = [name for name, _ in members]
+        raise ValueError(f"an object has two members {max(names, key=names.count)[:40]!r}")
+    return found
+
+
 def _finite(text: str) -> float:
     value = float(text)
     if not math.isfinite(value):

@@ -139,7 +139,7 @@ def confine(
 def parts(folder: Path, extensions: Collection[str]) -> Iterator[Path]:
     """Yield what to read for the files of a folder that have an extension, such as "p4d.json".
 
-    That is the folder, with the files of these extensions that its links lead to. Of the home
+    That is the folder, with the files of these extensions that its links lead to. Of a user's home
     folder, one above it and a hidden one it is the files alone: ``.ssh`` lies beside them.
     """
     endings = tuple(f".{extension}" for extension in extensions)
@@ -158,8 +158,14 @@ def parts(folder: Path, extensions: Collection[str]) -> Iterator[Path]:
 
 
 def holds_home(folder: Path) -> bool:
-    """Whether the user's home folder is a folder, or lies in it."""
-    return Path(os.path.realpath(Path.home())).is_relative_to(os.path.realpath(folder))
+    """Whether a user's home folder is a folder, or lies in it."""
+    own, homes = os.path.realpath(folder), {os.fspath(Path.home())}
+    if sys.platform != "win32":
+        import pwd
+
+        # Those of people, not of services such as /usr/sbin.
+        homes |= {user.pw_dir for user in pwd.getpwall() if 1000 <= user.pw_uid < 65534}
+    return any(Path(os.path.realpath(home)).is_relative_to(own) for home in homes)
 
 
 def _drop_capabilities() -> None:

@@ -35,14 +35,14 @@ class Promise:
     ----------
     folder : with its files; it need not exist yet.
     ending : of their names.
-    below : whether folders in it belong to it.
+    below : whether folders in it belong to it, but for hidden ones.
     linked : the file itself, or that to which it is a link, whatever its name.
     replaces : which files that exist it may replace.
     copies : beside `linked`, also names that begin with its name and this.
     """
 
     folder: Path
-    ending: str
+    ending: str | tuple[str, ...]
     below: bool = False
     linked: Path | None = None
     replaces: Literal["all", "the file itself", "none"] = "all"
@@ -73,7 +73,9 @@ class Promise:
         if path.name.startswith(".") or not path.name.endswith(self.ending):
             return False
         own, there = os.path.realpath(self.folder), Path(os.path.realpath(path.parent))
-        return there.is_relative_to(own) if self.below else str(there) == own
+        if not self.below or not there.is_relative_to(own):
+            return str(there) == own
+        return not any(part.startswith(".") for part in there.relative_to(own).parts)
 
     def may_replace(self, path: Path) -> bool:
         """Whether a file may be replaced, if it exists."""

@@ -112,7 +112,7 @@ def completed(
     line, done = [*history.done, *reversed(history.undone)], len(history.done)
     index = max((k for k, each in enumerate(line) if same(each, step)), default=None)
     is_done = index is None or index < done
-    now = (with_readings if is_done else _versions)(grade.state, readings)
+    now = (with_readings if is_done else _versions)(grade.state, readings, step)
     if index is None and not any(_has(grade.state, change) for change in step.changes):
         return grade, history
     if index is None:  # merged with other steps, when another program wrote the file
@@ -131,7 +131,7 @@ def completed(
     state, orders = before, [like, *line[index + 1 :]]
     for k, order in enumerate(orders, index):
         before = line[k].apply(before)
-        after = with_readings(before, readings)
+        after = with_readings(before, readings, step)
         line[k] = replace(line[k], changes=_changes(state, after, order))
         state = after
     line[index] = replace(line[index], label=like.label, unread=False)
@@ -148,27 +148,33 @@ def _has(state: State, change: Change) -> bool:
     return all(getattr(own, name) == getattr(made, name) for name in _INPUTS)
 
 
-def with_readings(state: State, readings: Readings) -> dict[Key, Any]:
-    """Return a state whose picks have their readings, where nothing else changed them."""
-    result = _versions(state, readings)
+def with_readings(state: State, readings: Readings, step: Edit | None = None) -> dict[Key, Any]:
+    """Return a state whose picks have their readings, where nothing else changed them.
+
+    Of the versions those have them that have what the step made, which they are of.
+    """
+    result = _versions(state, readings, step)
     for old, new in readings:
-        own = result.get(("pick", old.id))
-        if own is None:
-            continue
-        changes = {
-            field.name: getattr(new, field.name)
-            for field in dataclasses.fields(old)
-            if getattr(old, field.name) != getattr(new, field.name)
-        }
-        window = changes.pop("window", None)
-        same = {*_INPUTS, *changes}
-        if all(getattr(own, name) == getattr(old, name) for name in same):
-            own = replace(own, **changes)
-        # It depends on its boxes alone: the feather may have changed since.
-        if window and own.window and old.window and own.window.keys == old.window.keys:
-            own = replace(own, window=replace(own.window, keys=window.keys))
-        result["pick", old.id] = own
+        if (own := result.get(("pick", old.id))) is not None:
+            result["pick", old.id] = _read(own, old, new)
     return result
+
+
+def _read(own: Pick, old: Pick, new: Pick) -> Pick:
+    """Return a pick with what was read for it as it was, where nothing else changed it."""
+    changes = {
+        field.name: getattr(new, field.name)
+        for field in dataclasses.fields(old)
+        if getattr(old, field.name) != getattr(new, field.name)
+    }
+    window = changes.pop("window", None)
+    same = {*_INPUTS, *changes}
+    if all(getattr(own, name) == getattr(old, name) for name in same):
+        own = replace(own, **changes)
+    # It depends on its boxes alone: the feather may have changed since.
+    if window and own.window and old.window and own.window.keys == old.window.keys:
+        own = replace(own, window=replace(own.window, keys=window.keys))
+    return own
 
 
 def same(step: Edit, other: Edit) -> bool:
@@ -183,14 +189,18 @@ def _changes(before: State, after: State, order: Edit) -> tuple[Change, ...]:
     return tuple(sorted(new, key=lambda change: places.get(change.key, len(places))))
 
 
-def _versions(state: State, readings: Readings) -> dict[Key, Any]:
-    """Return a state whose versions have the readings, where they hold the very same picks."""
+def _versions(state: State, readings: Readings, step: Edit | None) -> dict[Key, Any]:
+    """Return a state whose versions have the readings, if they have what the step made."""
     result = dict(state)
     for (kind, name), value in state.items():
-        if kind == "version":
-            new = {
-                ("pick", old.id): new for old, new in readings if value.get(("pick", old.id)) == old
-            }
-            if new:
-                result["version", name] = {**value, **new}
+        if kind != "version" or not (step is None or any(_has(value, c) for c in step.changes)):
+            continue
+        own = {old.id: value.get(("pick", old.id)) for old, _ in readings}
+        new = {
+            ("pick", old.id): _read(own[old.id], old, read)
+            for old, read in readings
+            if own[old.id] is not None
+        }
+        if any(value[key] != pick for key, pick in new.items()):
+            result["version", name] = {**value, **new}
     return result

@@ -15,7 +15,7 @@ from typing import Any
 from palette4d import _core
 from palette4d.common.errors import Arg, Palette4dError
 from palette4d.common.files import beside, names_a_server, refuse_existing, replacing
-from palette4d.common.json_files import read_regular
+from palette4d.common.json_files import read_regular, with_unique_names
 from palette4d.lut_export.series import Series
 from palette4d.shows import timeline_files
 from palette4d.shows.manifest import DONE, Entry, Manifest
@@ -107,7 +107,7 @@ def _document(source: Path, rate: Fraction) -> Any:
     if source.suffix.lower() == ".otio":
         text = read_regular(source, timeline_files.LARGEST_FILE)
     try:
-        return json.loads(text)
+        return json.loads(text, object_pairs_hook=with_unique_names)
     except (ValueError, RecursionError) as error:
         raise Palette4dError(
             f"{source}: it cannot be read as JSON ({error}); expected finite numbers, and metadata "
