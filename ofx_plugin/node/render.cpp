@@ -143,7 +143,8 @@ std::shared_ptr<const CleanUp> cleaned_up(const Suites& suites, const Image& in,
         drawing, {in.channels, in.premultiplied}, clean_up_place(in, window, scale, drawing));
     if (!clean_up) return nullptr;
     const auto read = [&](int y, int x1, int x2, float* space) -> const float* {
-        if (in.depth == Depth::kFloat && is_aligned(in)) return reinterpret_cast<const float*>(in.at(x1, y));
+        if (in.depth == Depth::kFloat && is_aligned(in))
+            return reinterpret_cast<const float*>(in.at(x1, y));
         read_floats(in, {x1, y, x2, y + 1}, space);
         return space;
     };

@@ -319,15 +319,20 @@ def test_the_former_file_has_its_name_from_any_sidecars(clip, tmp_path, name):
     if name == "link.p4d.json":
         folder = tmp_path / "there"
         folder.mkdir()
+        out = tmp_path / "here" / name
+        out.parent.mkdir()
         out.symlink_to(folder / "own.p4d.json")
         (folder / "own.p4d.json").touch()
     analyze = ["analyze", str(clip), "-o", str(out), "--quiet"]
     assert main.main([*analyze, "--method", "static"]) == 0
     assert main.main(["edit", str(out), "palette", "--by", "0.1", "0", "0"]) == 0
     edited = out.read_bytes()
+    stem = "own" if name == "link.p4d.json" else name.removesuffix(".p4d.json")
+    taken = folder / f"{stem}.former.p4d.json"
+    taken.write_text("of another analysis")
     # A program of its own confines itself.
     subprocess.run([sys.executable, "-m", "palette4d", *analyze, "--keep-edits"], check=True)
-    (former,) = folder.glob("*.former.p4d.json")
+    (former,) = {*folder.glob("*.former*.p4d.json")} - {taken}
     assert former.read_bytes() == edited
     assert Document.load(out).grade.settings
 

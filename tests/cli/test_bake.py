@@ -17,6 +17,8 @@ from posix_files import pipes
 
 from palette4d.cli.main import main
 from palette4d.grade.document import Document
+from palette4d.grade.later import Unread
+from palette4d.grade.unread_steps import as_unread
 from palette4d.shows.manifest import Manifest, write
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
@@ -377,3 +379,21 @@ def test_a_window_that_the_file_lacks_is_told(
     assert "window" not in capsys.readouterr().err
     assert main(["bake", str(path), "--frame", "4", *words, str(tmp_path / "a.cc")]) == 0
     assert "mattes" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("verb", ["bake", "export", "config"])
+def test_picks_that_are_not_followed_yet_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], verb: str
+) -> None:
+    document = Document.load(EDITED)
+    seen = document.grade.palette(4).rgb[0].tolist()
+    document.pick(4, colour=seen, by=(0.1, 0, 0), clip=Unread(seen))
+    document.history = as_unread(document.history)
+    document.save(path := tmp_path / "a.p4d.json")
+    words = {
+        "bake": ["--frame", "4", "-o", tmp_path / "a.cube"],
+        "export": ["--frames", "4", "-o", tmp_path / "luts"],
+        "config": ["--frames", "4", "--anyway", "-o", tmp_path / "config"],
+    }
+    main([verb, str(path), *map(str, words[verb])])
+    assert "p1 not yet followed" in capsys.readouterr().err

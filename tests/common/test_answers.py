@@ -89,3 +89,17 @@ def test_what_is_no_answer_is_an_error(data: bytes) -> None:
 def test_what_cannot_be_answered_is_an_error_there(value: object) -> None:
     with pytest.raises(TypeError, match="no answer"):
         answers.written(value)
+
+
+def test_few_bytes_of_very_many_parts_are_no_answer() -> None:
+    nested: object = 1
+    for _ in range(40):
+        nested = [nested, nested]
+    with pytest.raises(Palette4dError, match="too many parts"):
+        back(nested)
+
+
+@pytest.mark.parametrize("problem", [BrokenPipeError(), StopIteration()])
+def test_an_error_that_would_end_the_reader_is_no_answer(problem: Exception) -> None:
+    with pytest.raises(Palette4dError, match="must not"):
+        answers.read(answers.written((None, problem)))

@@ -149,6 +149,22 @@ def test_a_step_that_was_undone_and_forgotten_leaves_nothing(
     assert grade.pick("p1").matte == trial.grade.pick("p1").matte != before.pick("p1").matte
 
 
+def test_an_area_that_is_added_meanwhile_leaves_the_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    document, where = moving(monkeypatch), {"pixel": (20, 30), "box": 9, "to": "#2040b0"}
+    before = document.grade
+    document.pick(0, **where)
+    read, done = document.grade, document.history.done[-1]
+    document = Document(before)
+    document.pick(0, **where, clip=later.Unread(read.pick("p1").rgb))
+    made, step = document.grade, document.history.done[-1]
+    document.add_area("p1", Area(0, ((20, 36),), 3), clip=later.Unread())
+    readings = later.readings_of(read, made)
+    steps = step, done
+    grade, _ = later.completed(document.grade, document.history, steps, readings, read.mattes)
+    assert grade.pick("p1").path == read.pick("p1").path
+    assert grade.pick("p1").matte is None  # it is learned with the area
+
+
 def test_versions_that_are_kept_meanwhile_have_what_is_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

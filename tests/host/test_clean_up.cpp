@@ -84,6 +84,22 @@ TEST(picks_are_cleaned_up_as_in_a_file) {
     }
 }
 
+TEST(rows_of_floats_at_any_byte_are_cleaned_up) {
+    Picked node;
+    const Picture source = scene_of(large(rect(-9, 4, 78, 60)));
+    const std::vector<unsigned char> expected = node.render(source, 2);
+    Layout layout = source.layout();
+    layout.padding = 2;
+    Picture odd(layout), output(layout);
+    const OfxRectI& bounds = layout.bounds;
+    for (int y = bounds.y1; y < bounds.y2; ++y) {
+        std::memcpy(odd.at(bounds.x1, y), source.at(bounds.x1, y),
+                    static_cast<std::size_t>(layout.width() * layout.pixel_bytes()));
+    }
+    CHECK(node.instance->render(2, &odd, output, bounds) == kOfxStatOK);
+    CHECK(output.pixels(bounds) == expected);
+}
+
 /// A part of a picture as a picture of its own.
 Picture cropped(const Picture& from, const OfxRectI& bounds, double scale) {
     Layout layout = from.layout();

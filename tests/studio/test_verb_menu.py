@@ -18,8 +18,9 @@ from PySide6.QtWidgets import QCheckBox, QComboBox, QLineEdit, QMessageBox
 
 from palette4d import Document
 from palette4d.cli.main import build_parser
-from palette4d.studio import texts
+from palette4d.studio import grade_steps, texts
 from palette4d.studio.choice import SearchChoice
+from palette4d.studio.pixels import place_between
 from palette4d.studio.verb_dialog import VerbDialog
 from palette4d.studio.window import Window
 
@@ -60,6 +61,22 @@ def test_no_verb_reads_a_file_that_lacks_the_windows_edits(opened: Window, sidec
     assert dialog.job is None
     assert texts.NOT_SAVED in dialog.stage.text()
     session.revert()
+    dialog.start()
+    assert dialog.job is not None
+    dialog.job.cancel()
+
+
+def test_no_verb_reads_a_file_while_an_edit_is_followed(opened: Window, qtbot: Any) -> None:
+    session = opened.session
+    place = place_between(session, (5, 5), (5, 5))
+    assert place is not None
+    grade_steps.hold(session, place)
+    assert session.following
+    dialog = opened.verbs.bake()
+    dialog.start()
+    assert dialog.job is None
+    assert dialog.stage.text() == texts.STILL_FOLLOWING
+    qtbot.waitUntil(lambda: not session.following, timeout=30_000)
     dialog.start()
     assert dialog.job is not None
     dialog.job.cancel()

@@ -70,6 +70,7 @@ def run(args: argparse.Namespace) -> int:
     from palette4d.grade.document import Document
     from palette4d.lut_export.bake import bake
     from palette4d.lut_export.formats import format_named, format_of
+    from palette4d.shows.exports import not_followed
 
     source = args.sidecar
     if args.version:
@@ -99,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
             "the clip's frame could not be read; the error is measured on the dense grid only "
             "(name the clip with --clip)",
         )
-    for line in warnings(result, format_):
+    for line in [*warnings(result, format_), *not_followed(args.sidecar)]:
         tell(args, "warning", line)
     return 0
 

@@ -19,8 +19,9 @@ from typing import Any
 from palette4d.common.errors import Palette4dError
 from palette4d.common.message import Message
 
-#: Bytes of an answer: the largest LUT takes some 100 MB.
-LARGEST = 1 << 30
+#: Bytes of an answer: the largest LUT takes some 100 MB. Parts of it, each counted as often as it
+#: is met: lists of one list twice, forty deep, are few bytes.
+LARGEST, MOST_PARTS = 1 << 30, 10_000_000
 
 _MADE = ("palette4d.common.answers", "made")
 
@@ -48,14 +49,33 @@ def read(data: bytes) -> tuple[Any, Exception | None]:
     """
     try:
         result, problem = _Reader(io.BytesIO(data)).load()
-        if not isinstance(problem, Exception | None):
+        # Those two would end this process, or a loop in it, without a word.
+        ends = isinstance(problem, BrokenPipeError | StopIteration)
+        if ends or not isinstance(problem, Exception | None):
             raise TypeError("no error")
+        _check_parts(result)
         return result, problem
     except Exception as error:
         raise Palette4dError(
             f"the process that reads files answered what it must not ({error}); was a file made "
             "to take it over?"
         ) from error
+
+
+def _check_parts(value: object) -> None:
+    """Refuse a value that would take too long to go through."""
+    left, parts = MOST_PARTS, [value]
+    while parts:
+        part = parts.pop()
+        left -= 1
+        if left < 0:
+            raise TypeError("too many parts")
+        if isinstance(part, dict):
+            parts += [*part, *part.values()]
+        elif isinstance(part, list | tuple | set | frozenset):
+            parts += part
+        elif dataclasses.is_dataclass(part) and not isinstance(part, type):
+            parts += [getattr(part, each.name) for each in dataclasses.fields(part)]
 
 
 class _Writer(pickle.Pickler):

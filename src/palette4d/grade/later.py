@@ -168,6 +168,11 @@ def _read(own: Pick, old: Pick, new: Pick) -> Pick:
         if getattr(old, field.name) != getattr(new, field.name)
     }
     window = changes.pop("window", None)
+    # Areas that were added since are for the matte alone.
+    followed = all(getattr(own, n) == getattr(old, n) for n in ("kind", "frame", "rgb", "path"))
+    if "path" in changes and "rgb" not in changes and followed:
+        own = replace(own, path=changes["path"])
+        old = replace(old, path=changes["path"])
     same = {*_INPUTS, *changes}
     if all(getattr(own, name) == getattr(old, name) for name in same):
         own = replace(own, **changes)

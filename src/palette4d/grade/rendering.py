@@ -17,11 +17,10 @@ import numpy as np
 from palette4d import _core
 from palette4d.common.files import make_folder
 from palette4d.common.message import Arg
-from palette4d.common.text import some_of
 from palette4d.grade.document import Document
 from palette4d.grade.movie_rendering import MoviePlan, rate_of
 from palette4d.grade.output import Output
-from palette4d.grade.unread_steps import unread_picks
+from palette4d.grade.unread_steps import unread_note, unread_picks
 from palette4d.media import existing
 from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip import Clip, Image, open_clip
@@ -123,10 +122,7 @@ def mismatches(document: Document, clip: Clip, whole: bool) -> list[str]:
             "own number. Check that this is the clip you mean"
         )
     if waiting := unread_picks(document.grade, document.history):
-        notes.append(
-            f"{some_of(waiting)} not yet followed through the clip, as a program ended too early: "
-            "open the sidecar in Studio, which goes on"
-        )
+        notes.append(unread_note(waiting))
     return notes
 
 

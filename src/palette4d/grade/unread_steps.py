@@ -8,6 +8,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from palette4d.common.text import some_of
 from palette4d.grade.edits import Change, Edit, State
 from palette4d.grade.grade import Grade
 from palette4d.grade.history import History
@@ -87,6 +88,14 @@ def readers(step: Edit, grade: Grade) -> list[Pick]:
     ids, picks = {change.id for change in step.changes if change.kind == "pick"}, grade.picks
     gone = ids - {pick.id for pick in picks}
     return [pick for pick in picks if gone or pick.id in ids]
+
+
+def unread_note(ids: Sequence[str]) -> str:
+    """Return what is said of picks whose steps have not read the clip yet."""
+    return (
+        f"{some_of(ids)} not yet followed through the clip, as a program ended too early: open the "
+        "sidecar in Studio, which goes on"
+    )
 
 
 def unread_picks(grade: Grade, history: History) -> list[str]:

@@ -13,6 +13,7 @@ from palette4d.common.arguments import parse_frames
 from palette4d.common.errors import Arg, Palette4dError, UnfinishedError
 from palette4d.common.text import counted, some_of
 from palette4d.grade.document import Document
+from palette4d.grade.unread_steps import unread_note, unread_picks
 from palette4d.jobs.workers import Workers
 from palette4d.lut_export import series
 from palette4d.lut_export.bake import SidecarBytes
@@ -154,6 +155,7 @@ def export(
             replace(request, sidecar=file, folder=folder / shot, name=shot)
             for file, shot in zip(files, _done(manifest), strict=True)
         ]
+    notes += [note for one in requests for note in not_followed(one.sidecar)]
     requests = [replace(one, sidecar=SidecarBytes.of(one.sidecar)) for one in requests]
     read = [SidecarBytes.of(one.sidecar).parsed() for one in requests]
     requests = [replace(one, frames=choose(core)) for one, core in zip(requests, read, strict=True)]
@@ -262,7 +264,15 @@ def config(
         anyway=anyway,
         progress=progress,
     )
+    notes += [note for file in files for note in not_followed(file)]
     return replace(done, notes=[*notes, *done.notes])
+
+
+def not_followed(file: Path) -> list[str]:
+    """Return a note on the picks of a sidecar for which the clip was not read yet."""
+    document = Document.load(file)
+    waiting = unread_picks(document.grade, document.history)
+    return [f"{file}: {unread_note(waiting)}"] if waiting else []
 
 
 def sidecars(paths: Iterable[Path]) -> tuple[list[Path], list[str]]:

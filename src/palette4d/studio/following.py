@@ -153,8 +153,8 @@ class Follower:
         self._jobs.popleft()
         self._jobs = deque(each.with_readings(readings, done.grade) for each in self._jobs)
         like = done.history.done[-1] if done.history.done else job.step
-        self._session.complete((job.step, like), readings, done.grade.mattes)
-        self._session.say(job.text)
+        if self._session.complete((job.step, like), readings, done.grade.mattes):
+            self._session.say(job.text)
         self._next()
 
     def _failed(self, job: Job, error: Exception) -> None:

@@ -315,8 +315,11 @@ class Session(Drafts):
 
     def complete(
         self, steps: tuple[Step, Step], readings: Readings, mattes: Mapping[str, str]
-    ) -> None:
-        """Put what was found in the clip into a step, and go on with what is being dragged."""
+    ) -> bool:
+        """Put what was found in the clip into a step, and go on with what is being dragged.
+
+        Return whether the step is done: it may have been undone meanwhile.
+        """
         document, dragged = self._document, self._dragged
         assert document is not None
         document.grade, document.history = later.completed(
@@ -327,6 +330,7 @@ class Session(Drafts):
             self._changed()
         else:
             self._show(*dragged)
+        return any(later.same(step, steps[1]) for step in document.history.done)
 
     def take_mattes(self, trial: Document) -> None:
         """Have the mattes that were learned for a copy of the document."""

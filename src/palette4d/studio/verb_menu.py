@@ -103,6 +103,8 @@ class VerbMenu:
 
     def _unsaved(self) -> str:
         """Return why the edits of the window are not in the file that a verb reads; else ""."""
+        if self.session.following:
+            return texts.STILL_FOLLOWING
         return "" if self.session.save() else self.session.status.text
 
     @property
