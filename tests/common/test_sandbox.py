@@ -13,12 +13,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import hostile_reader
+import PyOpenColorIO as ocio
 import pytest
 from confining import confines, forks
 from edits import sequence
 from farm_processes import wait_for
 
-from palette4d.common import sandbox, writer
+from palette4d.common import folders, sandbox, writer
 from palette4d.common.errors import Palette4dError
 from palette4d.media.clip_files import files_of_sidecar
 
@@ -43,6 +44,8 @@ FCM: NON-DROP FRAME
 001  frame  V     C        00:00:00:00 00:00:00:04 01:00:00:00 01:00:00:04
 * FROM CLIP NAME: frame.####.png
 """
+
+EDITED = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_edited.p4d.json"
 
 
 @pytest.fixture
@@ -292,6 +295,53 @@ def script(tmp_path: Path, *lines: str, replaces: str = "the file itself") -> su
     return subprocess.Popen(
         [sys.executable, "-P", "-c", "\n".join(text)], text=True, stdout=subprocess.PIPE
     )
+
+
+@confines
+@pytest.mark.parametrize("how", ["option", "variable"])
+def test_a_config_elsewhere_is_read_for_a_bake(home: Path, tmp_path: Path, how: str) -> None:
+    config = tmp_path / "configs" / "studio.ocio"
+    config.parent.mkdir()
+    built_in = ocio.Config.CreateFromBuiltinConfig("cg-config-v1.0.0_aces-v1.3_ocio-v2.1")
+    config.write_text(built_in.serialize())
+    show = tmp_path / "show"
+    show.mkdir()
+    shutil.copy(EDITED, show / "a.p4d.json")
+    words = [show / "a.p4d.json", "--frame", "4", "-o", show / "a.cube", "--space", "ACEScg"]
+    words += ["--ocio-config", config] if how == "option" else []
+    environment = {**os.environ, "OCIO": str(config)} if how == "variable" else None
+    command = [sys.executable, "-m", "palette4d", "bake", *map(str, words)]
+    subprocess.run(command, check=True, env=environment)
+    assert (show / "a.cube").exists()
+
+
+@confines
+def test_a_link_that_the_sandbox_does_not_follow_is_told(tmp_path: Path) -> None:
+    """As stores of assets have them: files that are named by their content."""
+    sequence(tmp_path / "store", "f", 1, 3)
+    (tmp_path / "clip").mkdir()
+    for path in (tmp_path / "store").iterdir():
+        (tmp_path / "clip" / path.name).symlink_to(path.rename(path.with_suffix("")))
+    (tmp_path / "out").mkdir()
+    out = str(tmp_path / "out" / "a.p4d.json")
+    analyze = ["analyze", str(tmp_path / "clip"), "-o", out, "--quiet"]
+    command = [sys.executable, "-m", "palette4d", *analyze]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "the sandbox opens files of such names alone" in done.stderr
+    assert subprocess.run([*command, "--sandbox", "off"]).returncode == 0
+
+
+def test_a_user_without_a_home_folder_needs_none(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unknown() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(Path, "home", unknown)
+    assert not sandbox.holds_home(home / "clip")
+    with pytest.raises(Palette4dError, match="set HOME"):
+        folders.home()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no sandbox")

@@ -3,6 +3,7 @@
 import itertools
 import json
 import os
+import shutil
 import stat
 import subprocess
 import sys
@@ -292,3 +293,20 @@ def test_a_pipe_in_the_place_of_the_lock_file_holds_nobody_for_ever(
         locking.locked(tmp_path / "clip.p4d.json"),
     ):
         raise AssertionError("the body must not run")
+
+
+def test_a_pick_whose_id_another_program_used_says_its_new_one(tmp_path: Path) -> None:
+    path = tmp_path / "a.p4d.json"
+    shutil.copy(GOLDEN / "v1_split.p4d.json", path)
+    mine, theirs = Document.load(path), Document.load(path)
+    mine.pick(3, colour=(0.4, 0.4, 0.4), by=(0.2, 0, 0), follow=False)
+    theirs.pick(5, colour=(0.2, 0.3, 0.4), by=(0, 0.2, 0), follow=False)
+    theirs.save()
+    assert theirs.renamed == {}
+    mine.save()
+    assert mine.renamed == {"p1": "p2"}
+    assert mine.grade.pick(mine.renamed["p1"]).frame == 3
+    mine.save()
+    mine.change_pick("p2", reach=1.0)
+    mine.save()
+    assert mine.renamed == {}

@@ -79,10 +79,22 @@ def _needs(args: argparse.Namespace) -> Needs | None:
         parts = sandbox.parts(output.parent, {output.suffix.lower().lstrip(".")})
         forced = args.force or getattr(args, "skip_existing", False)
         writes = Promise.of_file(output, "all" if forced else "none")
-        return Needs(writes, [Path(args.sidecar)], args.clip, list(parts))
+        files = [*parts, *_configs_of_bake(args)] if args.verb == "bake" else list(parts)
+        return Needs(writes, [Path(args.sidecar)], args.clip, files)
     if args.verb == "edit" and args.action in READING:
         return _of_edit(args)
     return None
+
+
+def _configs_of_bake(args: argparse.Namespace) -> Iterator[Path]:
+    """Yield what the configs read that may name the LUT's colour space."""
+    from palette4d.colour.ocio_config import files_of_config
+    from palette4d.grade import sidecar
+
+    yield from files_of_config(args.ocio_config or os.environ.get("OCIO") or "")
+    with contextlib.suppress(Palette4dError, OSError):  # the verb says so
+        clip = sidecar.load(args.sidecar)["clip"]
+        yield from files_of_config(clip.get("conversion", {}).get("config", ""))
 
 
 def _of_analysis(args: argparse.Namespace) -> Needs | None:

@@ -330,9 +330,8 @@ def run_set(args: argparse.Namespace) -> int:
             nearest.rgb if args.rgb is None else args.rgb, frame=args.frame
         ).rgb
         when = f" at frame {args.frame:g}"
-        print(
-            f"{document.grade.named(nearest.handle)}: {shown(nearest.rgb)} -> {shown(after)}{when}"
-        )
+        own = document.renamed.get(nearest.handle, nearest.handle)
+        print(f"{document.grade.named(own)}: {shown(nearest.rgb)} -> {shown(after)}{when}")
     return 0
 
 

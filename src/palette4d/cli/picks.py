@@ -389,7 +389,8 @@ def run_pick(args: argparse.Namespace) -> int:
             )
     document.save()
     follow = args.follow is not False
-    _print_pick(args, document, pick.id, followed=follow, boxed=follow and args.same is None)
+    own = document.renamed.get(pick.id, pick.id)
+    _print_pick(args, document, own, followed=follow, boxed=follow and args.same is None)
     return 0
 
 

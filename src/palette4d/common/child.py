@@ -165,9 +165,17 @@ class Child:
                 confined = self._reads, self._own.enter_context(folder)
             inherited = _handles(but=theirs) if context.get_start_method() == "fork" else []
             arguments = (theirs, self.seconds, self.megabytes, confined, inherited)
-            self._process = context.Process(target=_serve, args=arguments, daemon=True)
-            self._process.start()
-            theirs.close()
+            process = context.Process(target=_serve, args=arguments, daemon=True)
+            with theirs:
+                try:
+                    process.start()
+                except OSError as error:
+                    self.close()
+                    raise Palette4dError(
+                        f"the process that reads files cannot be started ({error.strerror}); end "
+                        "other programs, or raise the limit of processes (ulimit -u), and try again"
+                    ) from error
+            self._process = process
         if sys.platform == "win32":  # before it gets its first call
             self._own.enter_context(windows.limited(self._process.sentinel, self.megabytes))
 

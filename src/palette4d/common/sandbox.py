@@ -88,6 +88,22 @@ def of_command() -> bool:
     return is_command and wanted()
 
 
+def kept_closed(path: Path) -> str:
+    """Return what is said of a link that a confined process may not follow; "" of other files."""
+    if not (path.is_symlink() and wanted()):
+        return ""
+    try:
+        path.open("rb").close()
+    except PermissionError:
+        return (
+            f"; it is a link to {os.path.realpath(path)}, and the sandbox opens files of such "
+            "names alone: use --sandbox off, or links to files of the same kind of name"
+        )
+    except OSError:
+        pass
+    return ""
+
+
 def may_fork() -> bool:
     """Whether this is a command of one thread, whose forks are confined."""
     return of_command() and _is_alone()
@@ -159,7 +175,9 @@ def parts(folder: Path, extensions: Collection[str]) -> Iterator[Path]:
 
 def holds_home(folder: Path) -> bool:
     """Whether a user's home folder is a folder, or lies in it."""
-    own, homes = os.path.realpath(folder), {os.fspath(Path.home())}
+    own, homes = os.path.realpath(folder), set[str]()
+    with contextlib.suppress(RuntimeError):  # a user that the system does not know
+        homes.add(os.fspath(Path.home()))
     if sys.platform != "win32":
         import pwd
 

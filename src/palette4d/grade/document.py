@@ -76,6 +76,8 @@ class Document:
         As above.
     report : dict
         As above; empty for a loaded sidecar.
+    renamed : dict
+        New ids of picks and stops since the last save, where another program had used theirs.
     """
 
     def __init__(
@@ -91,6 +93,7 @@ class Document:
             fields = sidecar.up_to_date(_core.plain(content))
             self.grade, self.history = _read(core, fields, None)
         self._file: File | None = None
+        self.renamed: dict[str, str] = {}
         self.notes = tuple(notes)
         self.report = dict(report or {})
 
@@ -665,15 +668,16 @@ class Document:
             on_disk = sidecar.read_bytes(target)
             if on_disk == file.data and not self.changed:
                 return
-            grade, history = self.grade, self.history
+            grade, history, renamed = self.grade, self.history, dict[str, str]()
             if on_disk != file.data:
                 theirs = _read(*sidecar.decoded(on_disk, grade.name), self.path)
-                grade, history = merged(file, (grade, history), theirs)
+                grade, history, renamed = merged(file, (grade, history), theirs)
             history = replace(history, done=tuple(bounded(history.done)))
             members = grade.fields(history.done, history.undone)
             core, data = _core.encode_sidecar(members, str(target))
             sidecar.write(target, data, held, replaces=on_disk)
         self._saved(replace(grade, analysed=core), history, data)
+        self.renamed = renamed
 
 
 def content_of(document: Document) -> bytes | None:

@@ -179,8 +179,10 @@ def difference(before: State, after: State, label: str = "") -> Edit:
     )
 
 
-def merged(base: State, mine: State, theirs: State, taken: Collection[str]) -> dict[Key, Any]:
-    """Return the state with the changes of two writers since `base`.
+def merged(
+    base: State, mine: State, theirs: State, taken: Collection[str]
+) -> tuple[dict[Key, Any], dict[str, str]]:
+    """Return the state with the changes of two writers since `base`, and my ids that are new there.
 
     `taken` are ids of the palette, which stops must not use. An error where both writers changed
     one value, or set a stop at one place, in different ways.
@@ -208,7 +210,7 @@ def merged(base: State, mine: State, theirs: State, taken: Collection[str]) -> d
         place = _place(value) if kind == "handle" else None
         if place and stops.setdefault(place, id_) != id_:
             raise _conflict(f"edge {place[0]} at frame {place[1]:g}")
-    return result
+    return result, {id_: new for (_, id_), new in renamed.items()}
 
 
 def _put(state: dict[Key, Any], key: Key, value: Any) -> None:

@@ -48,8 +48,11 @@ class File:
 
 def merged(
     file: File, mine: tuple[Grade, History], theirs: tuple[Grade, History]
-) -> tuple[Grade, History]:
-    """Return another program's grade with my edits since the file was read, as one more step."""
+) -> tuple[Grade, History, dict[str, str]]:
+    """Return another program's grade with my edits since the file was read, as one more step.
+
+    Return also new ids of my picks and stops, by theirs that the other program has used too.
+    """
     (own, history), (other, steps) = mine, theirs
     if other.members["polytope"] != own.members["polytope"]:
         raise Palette4dError(
@@ -59,7 +62,7 @@ def merged(
         )
     taken = {*own.handles.vertices, *own.handles.edges}
     try:
-        state = edits.merged(file.state, own.state, other.state, taken)
+        state, renamed = edits.merged(file.state, own.state, other.state, taken)
     except Palette4dError as error:
         raise Palette4dError(f"{own.name}: {error.message.marked}") from None
     before = file.history.done
@@ -69,4 +72,4 @@ def merged(
     step = replace(step, unread=any(each.unread for each in new))
     if step.changes:
         steps = History((*steps.done, step), history.undone)
-    return other.with_mattes(own.mattes).with_state(state), steps
+    return other.with_mattes(own.mattes).with_state(state), steps, renamed

@@ -10,6 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from palette4d.common.sandbox import kept_closed
 from palette4d.media import exr_layers, oiio_text
 from palette4d.media.clip_base import LEAVE_OUT, MOST_SAMPLES, ClipError, FrameError, as_rate
 from palette4d.media.colour_tags import (
@@ -77,6 +78,7 @@ def read_header(path: Path, what: str, reading: Reading) -> Header:
 def unreadable(path: Path, what: str, problem: str) -> FrameError:
     """Return the error for a file that cannot be read."""
     reason = problem.strip().splitlines()[0] if problem.strip() else "no reason given"
+    reason += kept_closed(path)
     return FrameError(
         f"{path}: {what} cannot be read ({reason}); expected a whole image file.",
         LEAVE_OUT,

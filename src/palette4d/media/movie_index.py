@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from palette4d.common.arguments import MAX_FRAMES
+from palette4d.common.sandbox import kept_closed
 from palette4d.media.clip_base import ClipError
 from palette4d.media.movie_boxes import boxes
 from palette4d.media.movie_length import is_cut_short, promised_frames
@@ -43,6 +44,7 @@ def opened_movie(path: Path) -> Any:
                 f"{path}: the movie has no index yet: it is still being written, or its writing "
                 "was cut short; wait until it is done, or bring a whole copy"
             ) from error
+        reason += kept_closed(path)
         raise ClipError(
             f"{path}: the movie cannot be opened ({reason}); expected a whole movie file that "
             "FFmpeg can read. Bring a good copy, or convert it to an image sequence."

@@ -135,7 +135,7 @@ def export(
     choose = _chooser(every, stops, frames, show=show)
     timeline = edit = None
     notes: list[str] = []
-    requests = [request]
+    requests, files = [request], [path]
     if show:
         manifest = manifests.read(path)
         if otio is not None:
@@ -155,7 +155,7 @@ def export(
             replace(request, sidecar=file, folder=folder / shot, name=shot)
             for file, shot in zip(files, _done(manifest), strict=True)
         ]
-    notes += [note for one in requests for note in not_followed(one.sidecar)]
+    notes += [note for file in files for note in not_followed(file)]
     requests = [replace(one, sidecar=SidecarBytes.of(one.sidecar)) for one in requests]
     read = [SidecarBytes.of(one.sidecar).parsed() for one in requests]
     requests = [replace(one, frames=choose(core)) for one, core in zip(requests, read, strict=True)]

@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 
 from palette4d import _core
+from palette4d.common.folders import home
 from palette4d.media import clip_sequence
 from palette4d.media.clip import ClipError
 from palette4d.media.clip_sequence import ImageSequence
@@ -29,7 +30,7 @@ def place_for(path: Path) -> Path:
         folder = folder.parent
     if os.access(folder, os.W_OK) and (not path.exists() or os.access(path, os.W_OK)):
         return path
-    return Path.home() / OWN_FOLDER / path.name
+    return home() / OWN_FOLDER / path.name
 
 
 def sequence_of(path: str) -> str:

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QCheckBox, QFileDialog, QLineEdit
 from palette4d import _core
 from palette4d.analysis.options import METHODS
 from palette4d.common.errors import Palette4dError
+from palette4d.common.folders import home
 from palette4d.media import clip_sequence
 from palette4d.media.frame_writer import FORMATS
 from palette4d.shows.manifest import ENDING
@@ -70,7 +71,7 @@ def lut_fields(*left_out: str, usual: str = "") -> list[Field]:
 def _make_own_folder() -> None:
     """Make the folder that is proposed; if it cannot be made, the verb says why."""
     with contextlib.suppress(OSError):
-        (Path.home() / OWN_FOLDER).mkdir(parents=True, exist_ok=True)
+        (home() / OWN_FOLDER).mkdir(parents=True, exist_ok=True)
 
 
 class VerbMenu:
@@ -91,7 +92,7 @@ class VerbMenu:
         session = self.session
         session.save()
         dialog = VerbDialog(self.window, title, verb, fields, session.post, done, self._unsaved)
-        own = Path.home() / OWN_FOLDER
+        own = home() / OWN_FOLDER
         for field in fields:
             if field.kind in ("save", "folder") and own == Path(field.value).parent:
                 dialog.started.connect(_make_own_folder)
@@ -124,7 +125,7 @@ class VerbMenu:
 
     def try_sample(self) -> None:
         """Open the sample clip with its palette; the first time they are made, with progress."""
-        folder = Path.home() / OWN_FOLDER / "sample"
+        folder = home() / OWN_FOLDER / "sample"
         clip, sidecar = folder / "sample.####.png", folder / "sample.p4d.json"
         if sidecar.is_file():
             self.window.open_path(str(sidecar))
@@ -341,7 +342,7 @@ class VerbMenu:
             texts.INSTALL,
             "install-plugin",
             [
-                Field("--dest", texts.FOLDER, "folder", str(Path.home() / "OFX")),
+                Field("--dest", texts.FOLDER, "folder", str(home() / "OFX")),
                 Field("--link", texts.LINK, "check"),
                 Field("--kdenlive", "Kdenlive", "check"),
                 Field("--shotcut", "Shotcut", "check"),
