@@ -651,7 +651,7 @@ def test_a_temporary_folder_gives_its_files_the_folders_group(tmp_path: Path) ->
         made.touch()
         assert (made.stat().st_gid, made.parent.stat().st_gid) == (12345, 12345)
         assert folder.stat().st_mode & 0o777 == 0o700
-        copy = folder.with_name(f".palette4d.{'0' * 16}.p4d-tmp")
+        copy = folder.with_name(f".palette4d.{files._mark()}{'0' * 10}.p4d-tmp")
         shutil.copytree(folder, copy)
         copy.chmod(folder.stat().st_mode)
     files._swept.clear()
@@ -668,6 +668,22 @@ def test_without_locks_only_old_files_are_leftovers(
     fresh, stale = (old.with_name(f".a.{digit * 16}.p4d-tmp.cube") for digit in "01")
     fresh.touch()
     stale.touch()
+    os.utime(stale, (0, 0))
+    monkeypatch.setattr(files, "_swept", set())
+    replace(old, lambda: None)
+    assert names(old.parent) == [fresh.name, old.name]
+
+
+@modes
+def test_what_another_computer_writes_is_no_leftover_for_a_day(
+    old: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On shares such as those of sshfs each computer has locks of its own."""
+    own = old.with_name(f".a.{files._mark()}{'1' * 10}.p4d-tmp.cube")
+    other = f"{int(files._mark(), 16) ^ 1:06x}"
+    fresh, stale = (old.with_name(f".a.{other}{digit * 10}.p4d-tmp.cube") for digit in "01")
+    for path in (own, fresh, stale):
+        path.touch()
     os.utime(stale, (0, 0))
     monkeypatch.setattr(files, "_swept", set())
     replace(old, lambda: None)

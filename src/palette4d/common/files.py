@@ -2,7 +2,9 @@
 
 import contextlib
 import errno
+import hashlib
 import os
+import platform
 import re
 import secrets
 import shutil
@@ -25,8 +27,9 @@ else:
 
 #: What is said of an output file that exists.
 EXISTS = f"found a file there already; choose another name, or replace it with {Arg('force', True)}"
-_TEMPORARY = re.compile(r"\..*\.[0-9a-f]{16}\.p4d-tmp(\.[^.]*)?", re.DOTALL)
-#: Seconds after which a temporary file counts as left over where files cannot be locked.
+_TEMPORARY = re.compile(r"\..*\.([0-9a-f]{6})[0-9a-f]{10}\.p4d-tmp(\.[^.]*)?", re.DOTALL)
+#: Seconds after which a temporary file counts as left over where files cannot be locked, or where
+#: another computer made it: on some shares each computer has locks of its own.
 _LEFT_OVER_AFTER = 86400.0
 #: Mode of temporary folders: another user could give the name of one to any folder of ours that he
 #: may rename, but not this mode. The sticky bit on a closed folder does nothing else.
@@ -301,7 +304,13 @@ def _remove_folder(folder: Path) -> None:
 
 def _temporary_name(path: Path) -> Path:
     # File names have at most 250 bytes; 40 characters are enough to recognise the file.
-    return path.with_name(f".{path.stem[:40]}.{secrets.token_hex(8)}.p4d-tmp{path.suffix}")
+    token = _mark() + secrets.token_hex(5)
+    return path.with_name(f".{path.stem[:40]}.{token}.p4d-tmp{path.suffix}")
+
+
+def _mark() -> str:
+    """Return six digits that tell this computer's temporary files from those of most others."""
+    return hashlib.blake2s(platform.node().encode(), digest_size=3).hexdigest()
 
 
 def _new_temporary(path: Path) -> tuple[Path, int | None]:
@@ -462,7 +471,8 @@ def _empty(folder: int) -> None:
 
 def _is_unused(handle: int, about: os.stat_result, path: str, flags: int) -> bool:
     """Lock a temporary file; return whether no process has it locked."""
-    locked = _lock(handle)
+    name = _TEMPORARY.fullmatch(Path(path).name)
+    locked = _lock(handle) if name is not None and name[1] == _mark() else None
     if locked:
         # Some file systems grant every lock.
         again = os.open(path, flags)
