@@ -43,7 +43,7 @@ from palette4d.colour.difference import viewing_of
 from palette4d.common.errors import Arg, Palette4dError
 from palette4d.common.files import refuse_existing, replacing
 from palette4d.grade import sidecar as sidecars
-from palette4d.grade.document import Document
+from palette4d.grade.document import Document, content_of
 from palette4d.media.oiio_text import file_name
 from palette4d.media.source_clip import frame_colours
 
@@ -307,12 +307,10 @@ def _opened(
         source = SidecarBytes.of(Path(source))
     if isinstance(source, SidecarBytes):
         return source.parsed(), source.data, source.path
-    fields = source.fields()
-    if not source.changed and source.path is not None and source.path.is_file():
-        data = sidecars.read_bytes(source.path)
-        if sidecars.decoded(data, str(source.path))[1] == fields:
-            return source.grade.core, data, source.path
-    return source.grade.core, sidecars.dumps(fields).encode("utf-8"), source.path
+    data = None if source.changed else content_of(source)
+    if data is None:
+        data = sidecars.dumps(source.fields()).encode("utf-8")
+    return source.grade.core, data, source.path
 
 
 def check_target(path: Path, force: bool, sidecar: Path | None) -> None:

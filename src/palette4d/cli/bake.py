@@ -68,13 +68,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Bake; print the written file and its error."""
     from palette4d.grade.document import Document
+    from palette4d.grade.unread_steps import unread_note, unread_picks
     from palette4d.lut_export.bake import bake
     from palette4d.lut_export.formats import format_named, format_of
-    from palette4d.shows.exports import not_followed
 
-    source = args.sidecar
-    if args.version:
-        source = Document.load(source, version=args.version)
+    source = Document.load(args.sidecar)
+    waiting = unread_picks(source.grade, source.history)
+    source = source.version(args.version or "")
     piped = args.output == "-"
     if piped and args.format is None:
         args.parser.error("-o - has no extension; expected --format FORMAT with it")
@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
             "the clip's frame could not be read; the error is measured on the dense grid only "
             "(name the clip with --clip)",
         )
-    for line in [*warnings(result, format_), *not_followed(args.sidecar)]:
+    for line in [*warnings(result, format_), *([unread_note(waiting)] if waiting else [])]:
         tell(args, "warning", line)
     return 0
 

@@ -318,7 +318,7 @@ def run_set(args: argparse.Namespace) -> int:
     document = load(args.sidecar)
     before = _without_picks(document)
     nearest = document.set_near(args.near, frame=args.frame, anyway=args.anyway, **_how(args))
-    document.save()
+    renamed = document.save()
     print(
         f"the palette colour nearest to {shown(args.near)} at frame {args.frame:g} is "
         f"{shown(nearest.rgb)} of {nearest.id}, {nearest.distance:.3f} away"
@@ -330,7 +330,7 @@ def run_set(args: argparse.Namespace) -> int:
             nearest.rgb if args.rgb is None else args.rgb, frame=args.frame
         ).rgb
         when = f" at frame {args.frame:g}"
-        own = document.renamed.get(nearest.handle, nearest.handle)
+        own = renamed.get(nearest.handle, nearest.handle)
         print(f"{document.grade.named(own)}: {shown(nearest.rgb)} -> {shown(after)}{when}")
     return 0
 

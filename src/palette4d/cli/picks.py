@@ -387,9 +387,8 @@ def run_pick(args: argparse.Namespace) -> int:
             pick = document.pick(
                 args.frame, **where, to=args.to, by=args.by, **given, progress=progress
             )
-    document.save()
+    own = document.save().get(pick.id, pick.id)
     follow = args.follow is not False
-    own = document.renamed.get(pick.id, pick.id)
     _print_pick(args, document, own, followed=follow, boxed=follow and args.same is None)
     return 0
 

@@ -76,8 +76,6 @@ class Document:
         As above.
     report : dict
         As above; empty for a loaded sidecar.
-    renamed : dict
-        New ids of picks and stops since the last save, where another program had used theirs.
     """
 
     def __init__(
@@ -93,7 +91,6 @@ class Document:
             fields = sidecar.up_to_date(_core.plain(content))
             self.grade, self.history = _read(core, fields, None)
         self._file: File | None = None
-        self.renamed: dict[str, str] = {}
         self.notes = tuple(notes)
         self.report = dict(report or {})
 
@@ -623,7 +620,7 @@ class Document:
         plain: Fields = _core.plain(self.grade.fields(self.history.done, self.history.undone))
         return plain
 
-    def save(self, path: PathLike | None = None, *, on_edits: OnEdits = "refuse") -> None:
+    def save(self, path: PathLike | None = None, *, on_edits: OnEdits = "refuse") -> dict[str, str]:
         """Write the sidecar atomically: readers see the old file or the new file.
 
         Another program may have edited the file since it was loaded. Then `save` merges the edits
@@ -638,6 +635,11 @@ class Document:
             What to do with edits in that file, which would be lost. "keep" takes them over. If the
             palette differs, it copies the grade and keeps the old file under another name; `notes`
             says so.
+
+        Returns
+        -------
+        dict
+            New ids of picks and stops, by theirs that another program has used meanwhile.
 
         Raises
         ------
@@ -654,20 +656,20 @@ class Document:
                 f"this is not the document in {self.path}; expected another name to save it under"
             )
         if self._file is not None and self.path is not None and same_file(target, self.path):
-            self._save_again(link_target(target), self._file)
-            return
+            return self._save_again(link_target(target), self._file)
         fields = self.grade.fields(bounded(self.history.done), self.history.undone)
         clip = fields["clip"]
         fields["clip"] = {**clip, "source": _beside(clip["source"], self.path, target)}
         (core, fields, data), notes = reanalysis.save(fields, target, on_edits=on_edits)
         self._saved(*_read(core, fields, target), data)
         self.notes += tuple(notes)
+        return {}
 
-    def _save_again(self, target: Path, file: File) -> None:
+    def _save_again(self, target: Path, file: File) -> dict[str, str]:
         with locked(target) as held:
             on_disk = sidecar.read_bytes(target)
             if on_disk == file.data and not self.changed:
-                return
+                return {}
             grade, history, renamed = self.grade, self.history, dict[str, str]()
             if on_disk != file.data:
                 theirs = _read(*sidecar.decoded(on_disk, grade.name), self.path)
@@ -677,7 +679,7 @@ class Document:
             core, data = _core.encode_sidecar(members, str(target))
             sidecar.write(target, data, held, replaces=on_disk)
         self._saved(replace(grade, analysed=core), history, data)
-        self.renamed = renamed
+        return renamed
 
 
 def content_of(document: Document) -> bytes | None:
