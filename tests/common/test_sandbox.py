@@ -344,7 +344,7 @@ def test_a_user_without_a_home_folder_needs_none(
         folders.home()
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no sandbox")
+@forks
 def test_the_home_of_another_user_is_not_opened(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
